@@ -1,0 +1,104 @@
+"""ParticlePacking: disks or spheres in a box, checked once and then immutable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.box import Box
+from etc_engine.errors import GeometryError
+
+
+def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """An own, contiguous, read-only copy."""
+    values = np.array(values, dtype=np.float64, order="C", copy=True)
+    values.setflags(write=False)
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class ParticlePacking:
+    """Disks (2D) or spheres (3D) in a box.
+
+    Parameters
+    ----------
+    centers : ndarray, shape (n, d) [m]
+        Particle centres, inside the box (periodic axes are wrapped into it).
+    radii : ndarray, shape (n,) [m]
+        Particle radii, positive.
+    box : Box
+        The box that holds them.
+
+    Raises
+    ------
+    GeometryError
+        If there is no particle, a value is not finite, a radius is not positive or a centre lies
+        outside a wall; the message names the first offending particle (numbered from 0).
+
+    Examples
+    --------
+    >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    >>> packing.count, round(packing.density, 6)
+    (2, 0.392699)
+    """
+
+    centers: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    box: Box
+
+    def __post_init__(self) -> None:
+        centers, radii = np.asarray(self.centers, dtype=np.float64), np.asarray(self.radii, dtype=np.float64)
+        d = self.box.dimension
+        if centers.size == 0 or radii.size == 0:
+            raise GeometryError("the packing holds no particles: at least one is needed")
+        if centers.ndim != 2 or centers.shape[1] != d or radii.shape != (centers.shape[0],):
+            raise GeometryError(
+                f"centers of shape (n, {d}) and radii of shape (n,) are needed in a {d}D box, "
+                f"found {centers.shape} and {radii.shape}"
+            )
+        _refuse_first(~np.isfinite(centers).all(axis=1), "has a centre that is not finite", centers)
+        _refuse_first(~np.isfinite(radii), "has a radius that is not finite", radii)
+        _refuse_first(radii <= 0.0, "has a radius that is not positive", radii)
+        centers = self.box.wrap(centers)
+        outside = ((centers < 0.0) | (centers > np.asarray(self.box.lengths))).any(axis=1)
+        _refuse_first(outside, f"has its centre outside the box {self.box.lengths}", centers)
+        object.__setattr__(self, "centers", _frozen(centers))
+        object.__setattr__(self, "radii", _frozen(radii))
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+        return int(self.radii.size)
+
+    @property
+    def dimension(self) -> int:
+        """2 for disks, 3 for spheres."""
+        return self.box.dimension
+
+    @property
+    def measures(self) -> NDArray[np.float64]:
+        """Full area [m2] of each disk or volume [m3] of each sphere, shape (n,)."""
+        return np.pi * self.radii**2 if self.dimension == 2 else 4.0 / 3.0 * np.pi * self.radii**3
+
+    @property
+    def density(self) -> float:
+        """Sum of the full particle areas (volumes) over the box's, overlaps counted twice."""
+        return float(self.measures.sum() / self.box.volume)
+
+    def select(self, keep: NDArray[np.bool_] | NDArray[np.int64]) -> ParticlePacking:
+        """The packing of the particles picked by a mask or by row numbers, in that order."""
+        return ParticlePacking(self.centers[keep], self.radii[keep], self.box)
+
+    def with_radii(self, radii: NDArray[np.float64]) -> ParticlePacking:
+        """The same centres with other radii."""
+        return ParticlePacking(self.centers, radii, self.box)
+
+
+def _refuse_first(bad: NDArray[np.bool_], what: str, values: NDArray[np.float64]) -> None:
+    if bad.any():
+        row = int(np.flatnonzero(bad)[0])
+        others = int(bad.sum()) - 1
+        more = f" (and {others} more)" if others else ""
+        raise GeometryError(f"particle {row} {what}: found {values[row].tolist()}{more}")
