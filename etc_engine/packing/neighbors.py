@@ -1,0 +1,285 @@
+"""Neighbour pairs of a packing: all pairs whose surfaces are closer than a given reach, in linear time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from etc_engine.box import Box
+from etc_engine.errors import InputError
+from etc_engine.packing.particles import ParticlePacking
+
+MAX_LEVELS = 40
+"""Size classes halve from one to the next; radii below 2**-40 of the largest share the last class."""
+
+
+@dataclass(frozen=True, eq=False)
+class NeighborPairs:
+    """Pairs of neighbouring particles, sorted by i, then j, then shift.
+
+    Parameters
+    ----------
+    pairs : ndarray of int64, shape (m, 2)
+        Row numbers i <= j; i == j only for a particle next to its own periodic image.
+    shifts : ndarray of int64, shape (m, d)
+        Box shifts s: the neighbour of i is the image of j at ``x_j + s * lengths``.
+    gaps : ndarray, shape (m,) [m]
+        Surface gaps ``|x_j + s L - x_i| - R_i - R_j``; negative where particles overlap.
+    """
+
+    pairs: NDArray[np.int64]
+    shifts: NDArray[np.int64]
+    gaps: NDArray[np.float64]
+
+    @property
+    def count(self) -> int:
+        """Number of pairs."""
+        return int(self.gaps.size)
+
+
+def neighbor_pairs(
+    packing: ParticlePacking, gap: float = 0.0, relative_gap: float = 0.0, *, images: bool = True
+) -> NeighborPairs:
+    r"""All pairs of particles whose surface gap is within reach.
+
+    .. math:: |x_j + s L - x_i| - R_i - R_j \le g + g_r (R_i + R_j) / 2
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+        Disks or spheres in a box with any mix of walled and periodic axes.
+    gap : float
+        Largest gap g [m], not negative.
+    relative_gap : float
+        Largest gap in units of the mean radius of the pair, not negative.
+    images : bool
+        Whether to report a particle as the neighbour of its own periodic image (i == j).
+
+    Returns
+    -------
+    NeighborPairs
+        Each pair (i, j, s) once, with i < j, or i == j and the first nonzero component of s positive.
+        A periodic box under two diameters wide gives one pair for each image within reach.
+
+    Raises
+    ------
+    InputError
+        If a reach is negative or not finite.
+
+    Notes
+    -----
+    Particles are sorted into size classes, each with a cell grid as wide as its largest reach, and every
+    particle searches the grids of its own and the larger classes. The cost is linear in the number of
+    particles for any mixture of sizes, times the number of size classes present.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> packing = ParticlePacking([[0.1, 0.5], [0.9, 0.5]], [0.1, 0.1], Box((1.0, 1.0), (True, False)))
+    >>> found = neighbor_pairs(packing, gap=1e-9)
+    >>> found.pairs.tolist(), found.shifts.tolist()
+    ([[0, 1]], [[-1, 0]])
+    """
+    for name, value in (("gap", gap), ("relative_gap", relative_gap)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise InputError(f"the {name} of neighbour pairs must be finite and not negative, found {value}")
+    d = packing.dimension
+    centers = np.zeros((packing.count, 3))
+    centers[:, :d] = packing.centers
+    grid = _sort_into_grids(centers, packing.radii, packing.box, float(gap), float(relative_gap))
+    lengths, periodic = _padded_lengths(packing.box), _padded_flags(packing.box)
+    arguments = (centers, packing.radii, *grid, lengths, periodic, float(gap), float(relative_gap), images)
+    i, j, shift, gaps = _search(*arguments)
+    order = _sort_pairs(i, j, shift, packing.count)
+    pairs = np.column_stack((i[order], j[order]))
+    return NeighborPairs(pairs, shift[order, :d].astype(np.int64), gaps[order])
+
+
+def _padded_lengths(box: Box) -> NDArray[np.float64]:
+    """Edge lengths of the box as three axes; a 2D box gets a third axis of unit length."""
+    return np.array([*box.lengths, *(1.0,) * (3 - box.dimension)])
+
+
+def _padded_flags(box: Box) -> NDArray[np.bool_]:
+    return np.array([*box.periodic, *(False,) * (3 - box.dimension)])
+
+
+def _sort_into_grids(
+    centers: NDArray[np.float64], radii: NDArray[np.float64], box: Box, gap: float, relative_gap: float
+) -> tuple[NDArray, ...]:
+    """Size classes from the largest radius down, and one cell grid for each class.
+
+    Returns
+    -------
+    order : particle row numbers sorted by class, then by cell
+    starts : where each cell's particles start in `order`, all classes one after another
+    first_cell : where each class's cells start in `starts`
+    cells : number of cells of each class along each axis, shape (classes, 3)
+    largest : largest radius of each class
+    begin : where each class starts in `order`
+    """
+    octave = np.floor(np.log2(radii.max() / radii)).astype(np.int64)
+    present, level = np.unique(np.minimum(octave, MAX_LEVELS), return_inverse=True)
+    members = np.bincount(level)
+    largest = np.array([radii[level == k].max() for k in range(present.size)])
+    lengths = _padded_lengths(box)
+    cells = np.ones((present.size, 3), dtype=np.int64)
+    for k in range(present.size):
+        width = 2.0 * largest[k] + gap + relative_gap * largest[k]
+        d = box.dimension
+        # no more than two cells for each particle of the class: memory stays linear, whatever the sizes
+        width = max(width, (box.volume / (2.0 * members[k])) ** (1.0 / d))
+        cells[k, :d] = np.clip(np.floor(lengths[:d] / width), 1, 2 * members[k] + 1)
+    first_cell = np.concatenate(([0], np.cumsum(cells.prod(axis=1))))
+    begin = np.concatenate(([0], np.cumsum(members)))
+    order, starts = _bin(centers, level, cells, first_cell, lengths)
+    return order, starts, first_cell, cells, largest, begin
+
+
+@njit(cache=True)
+def _bin(centers, level, cells, first_cell, lengths):  # type: ignore[no-untyped-def]
+    """Counting sort of the particles by class and cell."""
+    n = level.size
+    starts = np.zeros(first_cell[-1] + 1, dtype=np.int64)
+    cell = np.empty(n, dtype=np.int64)
+    for i in range(n):
+        k = level[i]
+        index = 0
+        for axis in range(3):
+            c = int(centers[i, axis] / lengths[axis] * cells[k, axis])
+            index = index * cells[k, axis] + min(max(c, 0), cells[k, axis] - 1)
+        cell[i] = first_cell[k] + index
+        starts[cell[i] + 1] += 1
+    for c in range(starts.size - 1):
+        starts[c + 1] += starts[c]
+    fill = starts[:-1].copy()
+    order = np.empty(n, dtype=np.int64)
+    for i in range(n):
+        order[fill[cell[i]]] = i
+        fill[cell[i]] += 1
+    return order, starts
+
+
+@njit(cache=True)
+def _cell_range(x, reach, length, count, periodic):  # type: ignore[no-untyped-def]
+    """First and last cell (not wrapped) that a search of the given reach around x has to visit."""
+    low = int(np.floor((x - reach) / length * count))
+    high = int(np.floor((x + reach) / length * count))
+    if not periodic:
+        low, high = max(low, 0), min(high, count - 1)
+        low, high = min(low, count - 1), max(high, 0)
+    return low, high
+
+
+@njit(cache=True)
+def _search(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0917
+    centers, radii, order, starts, first_cell, cells, largest, begin, lengths, periodic, gap, relative, images
+):
+    """Pairs found by every particle in the grids of its own and of the larger classes."""
+    n = radii.size
+    capacity = 4 * n + 16
+    out_i = np.empty(capacity, dtype=np.int64)
+    out_j = np.empty(capacity, dtype=np.int64)
+    out_shift = np.empty((capacity, 3), dtype=np.int32)
+    out_gap = np.empty(capacity)
+    found = 0
+    for own in range(largest.size):
+        for place in range(begin[own], begin[own + 1]):
+            i = order[place]
+            for k in range(own + 1):
+                reach = (radii[i] + largest[k]) * (1.0 + 0.5 * relative) + gap
+                reach += 1e-12 * (reach + lengths.max())  # rounding of the cell index must not lose a pair
+                x0, x1 = _cell_range(centers[i, 0], reach, lengths[0], cells[k, 0], periodic[0])
+                y0, y1 = _cell_range(centers[i, 1], reach, lengths[1], cells[k, 1], periodic[1])
+                z0, z1 = _cell_range(centers[i, 2], reach, lengths[2], cells[k, 2], periodic[2])
+                for cx in range(x0, x1 + 1):
+                    sx = cx // cells[k, 0]
+                    for cy in range(y0, y1 + 1):
+                        sy = cy // cells[k, 1]
+                        for cz in range(z0, z1 + 1):
+                            sz = cz // cells[k, 2]
+                            c = (cx - sx * cells[k, 0]) * cells[k, 1] + (cy - sy * cells[k, 1])
+                            c = first_cell[k] + c * cells[k, 2] + (cz - sz * cells[k, 2])
+                            for other in range(starts[c], starts[c + 1]):
+                                j = order[other]
+                                if k == own and j < i:
+                                    continue  # j finds i
+                                if i == j and not (
+                                    images and (sx > 0 or (sx == 0 and (sy > 0 or (sy == 0 and sz > 0))))
+                                ):
+                                    continue
+                                if i <= j:
+                                    low, high, tx, ty, tz = i, j, sx, sy, sz
+                                else:
+                                    low, high, tx, ty, tz = j, i, -sx, -sy, -sz
+                                dx = centers[high, 0] + tx * lengths[0] - centers[low, 0]
+                                dy = centers[high, 1] + ty * lengths[1] - centers[low, 1]
+                                dz = centers[high, 2] + tz * lengths[2] - centers[low, 2]
+                                touch = radii[low] + radii[high]
+                                square = dx * dx + dy * dy + dz * dz
+                                limit = touch + gap + relative * 0.5 * touch
+                                if square > limit * limit * (1.0 + 1e-12):
+                                    continue
+                                surface = np.sqrt(square) - touch
+                                if surface > gap + relative * 0.5 * touch:
+                                    continue
+                                if found == capacity:
+                                    capacity *= 2
+                                    out_i = _grown(out_i, capacity)
+                                    out_j = _grown(out_j, capacity)
+                                    out_gap = _grown(out_gap, capacity)
+                                    bigger = np.empty((capacity, 3), dtype=np.int32)
+                                    bigger[:found] = out_shift
+                                    out_shift = bigger
+                                out_i[found], out_j[found], out_gap[found] = low, high, surface
+                                out_shift[found, 0], out_shift[found, 1], out_shift[found, 2] = tx, ty, tz
+                                found += 1
+    return out_i[:found], out_j[:found], out_shift[:found], out_gap[:found]
+
+
+@njit(cache=True)
+def _grown(values, capacity):  # type: ignore[no-untyped-def]
+    bigger = np.empty(capacity, dtype=values.dtype)
+    bigger[: values.size] = values
+    return bigger
+
+
+@njit(cache=True)
+def _after(i, j, shift, a, b):  # type: ignore[no-untyped-def]
+    """Whether pair a comes after pair b in the order (i, j, shift)."""
+    if i[a] != i[b]:
+        return i[a] > i[b]
+    if j[a] != j[b]:
+        return j[a] > j[b]
+    for axis in range(3):
+        if shift[a, axis] != shift[b, axis]:
+            return shift[a, axis] > shift[b, axis]
+    return False
+
+
+@njit(cache=True)
+def _sort_pairs(i, j, shift, n):  # type: ignore[no-untyped-def]
+    """Stable order of the pairs by (i, j, shift): counting sorts by j, then i, then the few equal ones."""
+    order = np.arange(i.size)
+    for key in (j, i):
+        fill = np.zeros(n + 1, dtype=np.int64)
+        for m in range(key.size):
+            fill[key[m] + 1] += 1
+        for row in range(n):
+            fill[row + 1] += fill[row]
+        sorted_order = np.empty_like(order)
+        for m in order:
+            sorted_order[fill[key[m]]] = m
+            fill[key[m]] += 1
+        order = sorted_order
+    for place in range(1, order.size):
+        m = order[place]
+        slot = place
+        while slot > 0 and _after(i, j, shift, order[slot - 1], m):
+            order[slot] = order[slot - 1]
+            slot -= 1
+        order[slot] = m
+    return order
