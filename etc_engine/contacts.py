@@ -128,13 +128,12 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
     >>> overlap_contacts(packing).angles.round(4)
     array([[0.6435, 0.6435]])
     """
-    pairs, shifts, gaps = neighbor_pairs(packing, relative_gap=0.0)
+    near = neighbor_pairs(packing)
     radii = packing.radii
-    mean = 0.5 * (radii[pairs[:, 0]] + radii[pairs[:, 1]])
-    touching = gaps < -ROUND_OFF_OVERLAP * mean
-    pairs, shifts = pairs[touching], shifts[touching]
+    touching = near.gaps < -ROUND_OFF_OVERLAP * 0.5 * radii[near.pairs].sum(axis=1)
+    pairs, shifts = near.pairs[touching], near.shifts[touching]
     r_i, r_j = radii[pairs[:, 0]], radii[pairs[:, 1]]
-    distance = (r_i + r_j) + gaps[touching]
+    distance = (r_i + r_j) + near.gaps[touching]
     swallowed = distance <= np.abs(r_i - r_j)
     if swallowed.any():
         i, j = pairs[np.flatnonzero(swallowed)[0]]
@@ -188,13 +187,13 @@ def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float
     _check_half_angle(half_angle)
     if not (np.isfinite(bond_gap) and bond_gap >= 0.0):
         raise InputError(f"the bond gap must be a number of mean radii >= 0, found {bond_gap}")
-    pairs, shifts, _ = neighbor_pairs(packing, relative_gap=bond_gap)
+    near = neighbor_pairs(packing, relative_gap=bond_gap)
     wall_particles, walls, _ = _wall_distances(packing, bond_gap, 1.0)
     return ContactNetwork(
         packing,
-        pairs,
-        shifts,
-        np.full((pairs.shape[0], 2), float(half_angle)),
+        near.pairs,
+        near.shifts,
+        np.full((near.count, 2), float(half_angle)),
         wall_particles,
         walls,
         np.full(walls.size, float(half_angle)),

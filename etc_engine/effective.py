@@ -1,0 +1,171 @@
+"""Effective conductivity tensor of a packing from the energies of its steady solutions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from etc_engine.box import AXES, Box
+from etc_engine.contacts import ContactNetwork
+from etc_engine.dtem.steady import SteadySolution, solve_steady
+from etc_engine.errors import ConvergenceError
+from etc_engine.percolation import Backbone, find_backbone
+
+# The wall flows of a solution must agree with its energy and with each other to this part of the flux.
+BALANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class EffectiveConductivity:
+    """Effective conductivity of one packing.
+
+    Parameters
+    ----------
+    tensor : ndarray, shape (d, d) [W/(m K)]
+        Symmetric for a periodic box; components that walls leave undefined, or that were not asked for, are NaN.
+    spans : tuple of bool or None
+        For each axis, whether some cluster of contacts spans it; None if it was not asked for.
+    solutions : tuple of SteadySolution
+        The solutions behind it.
+    """
+
+    tensor: NDArray[np.float64]
+    spans: tuple[bool | None, ...]
+    solutions: tuple[SteadySolution, ...]
+
+    @property
+    def unknowns(self) -> int:
+        """Largest number of unknowns of a solve, dead ends taken out."""
+        return max((r.unknowns for s in self.solutions for r in s.reports), default=0)
+
+    @property
+    def iterations(self) -> int:
+        """Largest number of iterations of a solve."""
+        return max((r.iterations for s in self.solutions for r in s.reports), default=0)
+
+    @property
+    def relative_energy_error(self) -> float:
+        """Largest relative error of the conductivity estimated by a solve."""
+        return max((r.relative_energy_error for s in self.solutions for r in s.reports), default=0.0)
+
+    @property
+    def missing_axes(self) -> str:
+        """Axes that no path of contacts spans, as a word."""
+        return "".join(AXES[axis] for axis, flag in enumerate(self.spans) if flag is False)
+
+
+def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
+    """Load axes that share a matrix: each walled axis alone, all periodic axes together if no axis is walled.
+
+    Beside a walled axis a periodic one has a system of its own too, because the walls drive only their axis.
+
+    Examples
+    --------
+    >>> load_groups(Box((1.0, 1.0), (True, True))), load_groups(Box((1.0, 1.0), (False, True)))
+    (((0, 1),), ((0,), (1,)))
+    """
+    periodic = tuple(axis for axis in range(box.dimension) if box.periodic[axis])
+    walled = tuple((axis,) for axis in range(box.dimension) if not box.periodic[axis])
+    return tuple(sorted(walled + ((periodic,) if periodic else ())))
+
+
+def find_backbones(
+    network: ContactNetwork, axes: tuple[int, ...] | None = None
+) -> dict[tuple[int, ...], Backbone]:
+    """Backbone of every load group; shared by all contact angles and methods on one network."""
+    return {group: find_backbone(network, group) for group in _asked_groups(network.packing.box, axes)}
+
+
+def _asked_groups(box: Box, axes: tuple[int, ...] | None) -> tuple[tuple[int, ...], ...]:
+    groups = load_groups(box)
+    return groups if axes is None else tuple(group for group in groups if set(group) & set(axes))
+
+
+def effective_conductivity(
+    network: ContactNetwork,
+    *,
+    method: str = "chord",
+    conductivity: ArrayLike = 1.0,
+    contact_resistance: ArrayLike = 0.0,
+    tolerance: float = 1e-10,
+    axes: tuple[int, ...] | None = None,
+    backbones: dict[tuple[int, ...], Backbone] | None = None,
+) -> EffectiveConductivity:
+    """Effective conductivity by the discrete thermal element method.
+
+    Walls: k_aa = Q L_a / (S_a dT). Periodic: k_ab = (1/area) sum_p t_pa . K_p t_pb.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+    method, conductivity, contact_resistance, tolerance
+        As in `etc_engine.dtem.steady.solve_steady`.
+    axes : tuple of int, optional
+        Load axes wanted; all by default.
+    backbones : dict, optional
+        From `find_backbones` of a network with the same contacts.
+
+    Returns
+    -------
+    EffectiveConductivity
+        0 along an axis that no path of contacts spans.
+
+    Raises
+    ------
+    InputError, GeometryError, ConvergenceError
+
+    Examples
+    --------
+    >>> from etc_engine.contacts import bonded_contacts
+    >>> from etc_engine.packing.particles import ParticlePacking
+    >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    >>> effective_conductivity(bonded_contacts(packing, 0.1)).tensor.round(6)
+    array([[0.2621 ,       nan],
+           [     nan, 0.      ]])
+    """
+    box = network.packing.box
+    backbones = backbones or find_backbones(network, axes)
+    tensor = np.full((box.dimension, box.dimension), np.nan)
+    spans: list[bool | None] = [None] * box.dimension
+    solutions = []
+    for group in _asked_groups(box, axes):
+        solution = solve_steady(
+            network,
+            group,
+            method=method,
+            conductivity=conductivity,
+            contact_resistance=contact_resistance,
+            tolerance=tolerance,
+            backbone=backbones[group],
+        )
+        for axis, flag in zip(group, solution.backbone.spans, strict=True):
+            spans[axis] = flag
+        if box.periodic[group[0]]:
+            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume
+        else:
+            axis = group[0]
+            _check_balance(solution)
+            tensor[axis, axis] = solution.energies[0, 0] * box.lengths[axis] / box.cross_section(axis)
+        solutions.append(solution)
+    return EffectiveConductivity(tensor, tuple(spans), tuple(solutions))
+
+
+def wall_heat_flows(solution: SteadySolution) -> tuple[float, float]:
+    """Heat flow into the particles at the low wall and out of them at the far wall [W/m]."""
+    at_wall = solution.sides.nodes >= int(solution.backbone.contacts.sum())
+    hot = at_wall & (solution.temperatures[:, 0] == 1.0)
+    cold = at_wall & ~hot
+    return float(solution.heat_flows[hot, 0].sum()), -float(solution.heat_flows[cold, 0].sum())
+
+
+def _check_balance(solution: SteadySolution) -> None:
+    energy = float(solution.energies[0, 0])
+    heat_in, heat_out = wall_heat_flows(solution)
+    error = max(abs(heat_in - heat_out), abs(heat_in - energy))
+    if error > BALANCE * abs(energy):
+        raise ConvergenceError(
+            f"the heat flows do not balance: {heat_in:.10g} in, {heat_out:.10g} out, energy {energy:.10g}; "
+            f"ask for a smaller tolerance"
+        )
