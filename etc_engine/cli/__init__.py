@@ -1,0 +1,114 @@
+"""The command line: one file a command, the only package that prints.
+
+A command is a ``click.Command`` that returns its exit status (``None`` is 0). What goes wrong is raised
+as an ``EtcError`` and becomes one line here. Commands import the engine inside their functions, so that
+``--help`` loads nothing but click.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import NoReturn
+
+import click
+
+from etc_engine.cli.threads import hold_one_thread
+from etc_engine.errors import EtcError
+
+COMMANDS = {
+    "pack": "etc_engine.cli.pack:pack_command",
+    "solve": "etc_engine.cli.solve:solve_command",
+    "sweep": "etc_engine.cli.sweep:sweep_command",
+    "compare": "etc_engine.cli.compare:compare_command",
+    "report": "etc_engine.cli.report:report_command",
+    "info": "etc_engine.cli.info:info_command",
+    "rerun": "etc_engine.cli.rerun:rerun_command",
+    "models": "etc_engine.cli.models:models_command",
+    "homogenize": "etc_engine.cli.homogenize:homogenize_command",
+    "transient": "etc_engine.cli.transient:transient_command",
+}
+
+EXIT_DONE = 0
+EXIT_BUG = 1
+EXIT_REFUSED = 2
+EXIT_INTERRUPTED = 130  # what a shell reports of a process that Ctrl-C ended
+
+
+class CommandTable(click.Group):
+    """A click group whose commands are imported when they are asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Names of the commands whose module is there, in the order of the table."""
+        return [name for name, target in COMMANDS.items() if find_spec(target.partition(":")[0])]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command of that name; None when there is no such command."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        module, _, attribute = COMMANDS[cmd_name].partition(":")
+        command = getattr(import_module(module), attribute)
+        if not isinstance(command, click.Command):
+            raise TypeError(f"{COMMANDS[cmd_name]} is not a click command")
+        return command
+
+
+def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
+    if not wanted or ctx.resilient_parsing:
+        return
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        number = version("etc-engine")
+    except PackageNotFoundError:
+        number = "unknown (not installed)"
+    click.echo(f"etc-engine {number}")
+    ctx.exit()
+
+
+@click.command(cls=CommandTable, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Show the version and exit.",
+)
+def cli() -> None:
+    """Effective thermal conductivity of particle systems, and its statistics over random realizations."""
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line and answer its exit status; what goes wrong is one line on stderr."""
+    hold_one_thread()
+    try:
+        status = cli.main(args=arguments, prog_name="etc-engine", standalone_mode=False)
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "etc-engine"
+        return _refuse(f"{error.format_message()} (see: {where} --help)", EXIT_REFUSED)
+    except click.ClickException as error:
+        return _refuse(error.format_message(), EXIT_REFUSED)
+    except EtcError as error:
+        return _refuse(str(error), EXIT_REFUSED)
+    except (click.Abort, KeyboardInterrupt):
+        return _refuse("interrupted", EXIT_INTERRUPTED)
+    except Exception as error:
+        if os.environ.get("ETC_ENGINE_TRACEBACK"):
+            raise
+        what = f"unexpected {type(error).__name__}: {error}"
+        return _refuse(f"{what} (set ETC_ENGINE_TRACEBACK=1 to see where)", EXIT_BUG)
+    return status if isinstance(status, int) else EXIT_DONE
+
+
+def _refuse(message: str, status: int) -> int:
+    click.echo("etc-engine: " + " ".join(message.split()), err=True)
+    return status
+
+
+def main() -> NoReturn:
+    """Entry point of the console script."""
+    sys.exit(run())

@@ -1,0 +1,116 @@
+"""The command group: help, version, errors cut to one line, one thread a process."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+
+import click
+import pytest
+
+from etc_engine import cli
+from etc_engine.errors import InputError
+
+
+def etc_engine(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "etc_engine", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        env={**os.environ, **environment},
+    )
+
+
+def test_help_lists_commands_and_loads_nothing_heavy():
+    heavy = ("numpy", "xarray", "numba", "scipy", "pydantic", "mpi4py", "matplotlib", "tqdm")
+    code = (
+        "import sys\nfrom etc_engine.cli import run\n"
+        f"assert run(['--help']) == 0\nprint([m for m in {heavy!r} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "Commands:" in done.stdout or "Usage:" in done.stdout
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_help_is_fast():
+    started = time.perf_counter()
+    assert etc_engine("--help").returncode == 0
+    assert (
+        time.perf_counter() - started < 2.0
+    )  # 0.1 s on an idle machine; the bound leaves room for a busy one
+
+
+def test_each_command_has_help():
+    table = cli.CommandTable()
+    for name in table.list_commands(click.Context(table)):
+        done = etc_engine(name, "--help")
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.startswith(f"Usage: etc-engine {name}")
+
+
+def test_version_is_a_name_and_a_number():
+    done = etc_engine("--version")
+    assert done.returncode == 0
+    assert done.stdout.startswith("etc-engine ")
+
+
+@pytest.mark.parametrize("arguments", [("nothing",), ("--nothing",)])
+def test_usage_errors_are_one_line_and_status_2(arguments):
+    done = etc_engine(*arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    assert "nothing" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "word"),
+    [
+        (InputError("found -1,\n expected a positive number"), 2, "found -1, expected"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (ZeroDivisionError("oops"), 1, "unexpected ZeroDivisionError: oops"),
+    ],
+)
+def test_what_a_command_raises_becomes_one_line(monkeypatch, capsys, error, status, word):
+    @click.command("failing")
+    def failing() -> None:
+        raise error
+
+    monkeypatch.setattr(cli.CommandTable, "get_command", lambda *_: failing)
+    monkeypatch.delenv("ETC_ENGINE_TRACEBACK", raising=False)
+    assert cli.run(["failing"]) == status
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    lines = [line for line in captured.err.splitlines() if line]
+    assert len(lines) == 1
+    assert word in lines[0]
+
+
+def test_what_a_command_returns_is_the_exit_status(monkeypatch):
+    command = click.command("four")(lambda: 4)
+    monkeypatch.setattr(cli.CommandTable, "get_command", lambda *_: command)
+    assert cli.run(["four"]) == 4
+
+
+def _threads_seen(**environment: str) -> str:
+    clean = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    code = (
+        "from etc_engine.cli.threads import hold_one_thread\nhold_one_thread()\n"
+        "import numpy, threadpoolctl\n"
+        "numpy.ones((4, 4)) @ numpy.ones((4, 4))\n"
+        "print({p['num_threads'] for p in threadpoolctl.threadpool_info()})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**clean, **environment}
+    )
+    return done.stdout.strip()
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core: BLAS never starts a second thread")
+def test_one_thread_unless_asked():
+    assert _threads_seen() == "{1}"
+    assert _threads_seen(OPENBLAS_NUM_THREADS="2", OMP_NUM_THREADS="2") != "{1}"
