@@ -71,9 +71,7 @@ def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
     return tuple(sorted(walled + ((periodic,) if periodic else ())))
 
 
-def find_backbones(
-    network: ContactNetwork, axes: tuple[int, ...] | None = None
-) -> dict[tuple[int, ...], Backbone]:
+def find_backbones(network: ContactNetwork, axes: tuple[int, ...] | None = None) -> dict[tuple[int, ...], Backbone]:
     """Backbone of every load group; shared by all contact angles and methods on one network."""
     return {group: find_backbone(network, group) for group in _asked_groups(network.packing.box, axes)}
 

@@ -77,8 +77,8 @@ def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
         touches[clusters[network.wall_particles], network.walls] = True
         low, high = 2 * axes[0], 2 * axes[0] + 1
         spanning = (touches[:, low] & touches[:, high])[:, None]
-    spans = tuple(bool(flag) for flag in spanning.any(axis=0))
-    in_play = spanning.any(axis=1)[clusters]
+    spans = tuple(bool(column.any()) for column in spanning.T)
+    in_play = np.asarray(spanning.any(axis=1))[clusters]
     kept = _prune(in_play, network.pairs, network.wall_particles[driven])
     contacts = kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
     wall_contacts = driven & kept[network.wall_particles]
@@ -86,9 +86,7 @@ def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
 
 
 @njit(cache=True)
-def _root(
-    parent: NDArray[np.int64], offset: NDArray[np.int64], i: int, displacement: NDArray[np.int64]
-) -> int:
+def _root(parent: NDArray[np.int64], offset: NDArray[np.int64], i: int, displacement: NDArray[np.int64]) -> int:
     """Root of i; ``displacement`` becomes the boxes between the two (union by size keeps paths short)."""
     displacement[:] = 0
     while parent[i] != i:

@@ -38,8 +38,8 @@ class LinearSystem:
 
     def element_temperatures(self, elements: Elements, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Temperatures at all element rows, shape (rows, k), of the free values u, shape (f, k)."""
-        rows = self.free[elements.nodes]
-        return self.lift + np.where((rows >= 0)[:, None], u[np.maximum(rows, 0)], 0.0)
+        known = np.zeros((1, u.shape[1]))  # row -1: a prescribed node has all of its temperature in the lift
+        return self.lift + np.concatenate([u, known])[self.free[elements.nodes]]
 
 
 def assemble(elements: Elements, lift: NDArray[np.float64], prescribed: NDArray[np.bool_]) -> LinearSystem:
@@ -57,7 +57,7 @@ def assemble(elements: Elements, lift: NDArray[np.float64], prescribed: NDArray[
     -------
     LinearSystem
     """
-    free = np.where(prescribed, -1, np.cumsum(~prescribed) - 1)
+    free = np.where(prescribed, -1, np.cumsum(~prescribed) - 1).astype(np.int64)
     size = int((~prescribed).sum())
     matrix = csr_matrix(
         _assemble_csr(elements.offsets, elements.nodes, elements.starts, elements.values, free, size),
@@ -68,8 +68,10 @@ def assemble(elements: Elements, lift: NDArray[np.float64], prescribed: NDArray[
     flows = elements.apply(lift)
     rows = free[elements.nodes]
     inside = rows >= 0
-    rhs = np.stack([-np.bincount(rows[inside], flow[inside], minlength=size) for flow in flows.T], axis=1)
-    return LinearSystem(matrix, rhs, lift, np.einsum("rk,rk->k", lift, flows), free)
+    rhs = np.zeros((size, lift.shape[1]))
+    for load in range(lift.shape[1]):
+        rhs[:, load] = -np.bincount(rows[inside], flows[inside, load], minlength=size)
+    return LinearSystem(matrix, rhs, lift, np.asarray((lift * flows).sum(axis=0)), free)
 
 
 def count_positive_off_diagonals(matrix: csr_matrix) -> int:

@@ -39,6 +39,10 @@ class ContactSides:
         Position angle of the contact.
     alpha : ndarray, shape (s,) [rad]
         Half-angle of the contact's arc.
+    of_contacts : ndarray of int, shape (m, 2)
+        The two sides of each particle contact.
+    of_walls : ndarray of int, shape (w,)
+        The side of each wall contact.
     """
 
     offsets: NDArray[np.int64]
@@ -46,6 +50,8 @@ class ContactSides:
     arms: NDArray[np.float64]
     theta: NDArray[np.float64]
     alpha: NDArray[np.float64]
+    of_contacts: NDArray[np.int64]
+    of_walls: NDArray[np.int64]
 
     @property
     def particles(self) -> NDArray[np.int64]:
@@ -98,12 +104,25 @@ def contact_sides(network: ContactNetwork) -> ContactSides:
     alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=packing.count))])
+    place = np.empty_like(order)
+    place[order] = np.arange(order.size)
     arms = arms[order]
-    return ContactSides(offsets, nodes[order], arms, np.arctan2(arms[:, 1], arms[:, 0]), alpha[order])
+    return ContactSides(
+        offsets=offsets,
+        nodes=nodes[order],
+        arms=arms,
+        theta=np.arctan2(arms[:, 1], arms[:, 0]),
+        alpha=alpha[order],
+        of_contacts=place[: 2 * m].reshape(2, m).T,
+        of_walls=place[2 * m :],
+    )
 
 
 def side_resistances(
-    sides: ContactSides, method: str, conductivity: NDArray[np.float64], contact_resistance: NDArray[np.float64]
+    sides: ContactSides,
+    method: str,
+    conductivity: NDArray[np.float64],
+    contact_resistance: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Diagonal of H at every side: h_ii of the method, and the side's share of the contact resistance.
 
@@ -129,9 +148,7 @@ def side_resistances(
     return resistance
 
 
-def element_matrices(
-    sides: ContactSides, diagonal: NDArray[np.float64], conductivity: NDArray[np.float64]
-) -> Elements:
+def element_matrices(sides: ContactSides, diagonal: NDArray[np.float64], conductivity: NDArray[np.float64]) -> Elements:
     """Conductivity matrices of all disks.
 
     Parameters
@@ -154,19 +171,20 @@ def element_matrices(
     ----------
     Feng, Han, Li, Owen 2008, Eqs. 24 to 30, doi:10.1016/j.jcp.2008.01.031.
     """
+    check_arcs(sides)
     widths = np.diff(sides.offsets)
     starts = np.concatenate([[0], np.cumsum(widths**2)])
     values = np.zeros(int(starts[-1]))
-    bad, a, b = _fill_elements(
-        sides.offsets, sides.theta, sides.alpha, diagonal, conductivity, starts, values, int(widths.max(initial=0))
+    bad = _fill_elements(
+        sides.offsets,
+        sides.theta,
+        sides.alpha,
+        diagonal,
+        conductivity,
+        starts,
+        values,
+        int(widths.max(initial=0)),
     )
-    if bad >= 0 and a >= 0:
-        alpha, theta = np.degrees(sides.alpha[[a, b]]), np.degrees(sides.theta[[a, b]])
-        gap = abs((theta[0] - theta[1] + 180.0) % 360.0 - 180.0)
-        raise GeometryError(
-            f"two contact arcs of particle {bad} overlap: {gap:.4g} degrees apart with half-angles "
-            f"{alpha[0]:.4g} and {alpha[1]:.4g}; use smaller contact angles or less overlap"
-        )
     if bad >= 0:
         widest = np.degrees(sides.alpha[sides.offsets[bad] : sides.offsets[bad + 1]].max())
         raise GeometryError(
@@ -174,6 +192,38 @@ def element_matrices(
             f"{widest:.4g} degrees) are too wide or too close for this method; use smaller contact angles"
         )
     return Elements(sides.offsets, sides.nodes, starts, values)
+
+
+def check_arcs(sides: ContactSides) -> None:
+    """Refuse contact arcs that overlap on one particle.
+
+    Raises
+    ------
+    GeometryError
+        Naming the first particle, the distance of the two arcs and their half-angles.
+    """
+    particle, a, b = _overlapping_arcs(sides.offsets, sides.theta, sides.alpha)
+    if particle >= 0:
+        alpha, theta = np.degrees(sides.alpha[[a, b]]), np.degrees(sides.theta[[a, b]])
+        apart = abs((theta[0] - theta[1] + 180.0) % 360.0 - 180.0)
+        raise GeometryError(
+            f"two contact arcs of particle {particle} overlap: {apart:.4g} degrees apart with half-angles "
+            f"{alpha[0]:.4g} and {alpha[1]:.4g}; use smaller contact angles or less overlap"
+        )
+
+
+@njit(cache=True)
+def _overlapping_arcs(
+    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]
+) -> tuple[int, int, int]:
+    """First particle with overlapping arcs and the two sides, or -1."""
+    for p in range(offsets.size - 1):
+        for a in range(offsets[p], offsets[p + 1]):
+            for b in range(offsets[p], a):
+                separation = abs(theta[a] - theta[b])
+                if min(separation, 2.0 * np.pi - separation) < alpha[a] + alpha[b]:
+                    return p, a, b
+    return -1, -1, -1
 
 
 @njit(cache=True)
@@ -186,8 +236,8 @@ def _fill_elements(
     starts: NDArray[np.int64],
     values: NDArray[np.float64],
     widest: int,
-) -> tuple[int, int, int]:
-    """Fill the packed matrices; returns (-1, ..) or the first bad particle, with its overlapping sides if any."""
+) -> int:
+    """Fill the packed matrices; answers the first particle whose H is not positive definite, or -1."""
     h = np.empty((widest, widest))
     inverse = np.empty((widest, widest))
     for p in range(offsets.size - 1):
@@ -198,15 +248,11 @@ def _fill_elements(
             h[i, i] = diagonal[first + i]
             for j in range(i):
                 a, b = first + i, first + j
-                separation = abs(theta[a] - theta[b])
-                if separation > np.pi:
-                    separation = 2.0 * np.pi - separation
-                if separation < alpha[a] + alpha[b]:
-                    return p, a, b
-                h[i, j] = mutual_resistance_scalar(separation, alpha[a], alpha[b]) / conductivity[p]
+                mutual = mutual_resistance_scalar(theta[a] - theta[b], alpha[a], alpha[b])
+                h[i, j] = mutual / conductivity[p]
                 h[j, i] = h[i, j]
         if not _invert_on_differences(h, n, inverse):
-            return p, -1, -1
+            return p
         out = values[starts[p] : starts[p + 1]]
         for i in range(n - 1):
             total = 0.0
@@ -219,7 +265,7 @@ def _fill_elements(
         for i in range(n - 1):
             corner -= out[(n - 1) * n + i]
         out[n * n - 1] = corner
-    return -1, -1, -1
+    return -1
 
 
 @njit(cache=True)

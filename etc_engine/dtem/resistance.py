@@ -33,9 +33,7 @@ _REMAINDER = np.array(
     [-zeta(2 * k) / (k * (2 * k + 1) * (2 * k + 2)) / (2.0 * np.pi) ** (2 * k) for k in range(1, _TERMS + 1)]
 )
 # mean of ln cos(t/2) over |t| <= alpha, as a series in alpha^2, from ln cos z = ln(sin 2z / 2z) - ln(sin z / z)
-_LN_COS = np.array(
-    [-zeta(2 * k) * (4.0**k - 1.0) / (k * (2 * k + 1)) / (2.0 * np.pi) ** (2 * k) for k in range(1, 61)]
-)
+_LN_COS = np.array([-zeta(2 * k) * (4.0**k - 1.0) / (k * (2 * k + 1)) / (2.0 * np.pi) ** (2 * k) for k in range(1, 61)])
 
 # Feng et al. 2008, Table 1: the factor on the uniform-flux h_ii of the enhanced method
 _ENHANCED_DEGREES = np.array([1.0, 2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0])
@@ -63,7 +61,7 @@ def _reduced_clausen(x: float) -> float:
     return x * x * (0.5 * math.log(x) - 0.75) + _remainder(x)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mutual_resistance_scalar(separation: float, a: float, b: float) -> float:
     """Scalar kernel of `mutual_resistance`."""
     half = math.sin(0.5 * separation)
@@ -118,9 +116,7 @@ def clausen_c3(x: ArrayLike) -> NDArray[np.float64]:
     return _clausen_values(x.ravel()).reshape(x.shape)
 
 
-def mutual_resistance(
-    separation: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayLike
-) -> NDArray[np.float64]:
+def mutual_resistance(separation: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayLike) -> NDArray[np.float64]:
     """Resistance kappa h_ij between two different arcs of a disk, uniform flux on each.
 
     kappa h_ij = 1/pi {ln 2 + [C(D+a-b) + C(D-a+b) - C(D+a+b) - C(D-a-b)] / (4ab)}; for arcs that

@@ -12,6 +12,7 @@ from etc_engine.dtem.assembly import LinearSystem, assemble, count_positive_off_
 from etc_engine.dtem.element import (
     ContactSides,
     Elements,
+    check_arcs,
     contact_sides,
     element_matrices,
     side_resistances,
@@ -112,9 +113,7 @@ def solve_steady(
     Feng, Han, Li, Owen 2008, Box 1, doi:10.1016/j.jcp.2008.01.031.
     """
     conductivity = _positive(conductivity, network.packing.count, "conductivity", zero=False)
-    resistance = _positive(
-        contact_resistance, network.count + network.walls.size, "contact resistance", zero=True
-    )
+    resistance = _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True)
     if network.packing.dimension != 2:
         raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
     if backbone is None:
@@ -122,14 +121,14 @@ def solve_steady(
     reduced = network.select(backbone.contacts, backbone.wall_contacts)
     sides = contact_sides(reduced)
     kept = np.concatenate([backbone.contacts, backbone.wall_contacts])
+    if not kept.all():  # what carries no heat must still be a valid geometry
+        check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), _driven(network, axes))))
     diagonal = side_resistances(sides, method, conductivity, resistance[kept])
     elements = element_matrices(sides, diagonal, conductivity)
     if elements.nodes.size == 0:
         nothing = np.zeros((0, len(axes)))
         zero = np.zeros((len(axes), len(axes)))
-        return SteadySolution(
-            network, axes, backbone, sides, diagonal, conductivity, nothing, nothing, zero, (), 0
-        )
+        return SteadySolution(network, axes, backbone, sides, diagonal, conductivity, nothing, nothing, zero, (), 0)
     system = _load(reduced, axes, backbone, sides, elements)
     u, reports = _solve(system, tolerance)
     temperatures = system.element_temperatures(elements, u)
@@ -147,6 +146,11 @@ def solve_steady(
         reports,
         count_positive_off_diagonals(system.matrix),
     )
+
+
+def _driven(network: ContactNetwork, axes: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Wall contacts with the walls that drive the flow; none around a periodic axis."""
+    return np.asarray(network.walls // 2 == axes[0])
 
 
 def _load(

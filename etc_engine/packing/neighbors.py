@@ -175,7 +175,7 @@ def _cell_range(x, reach, length, count, periodic):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True)
-def _search(  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0917
+def _search(  # type: ignore[no-untyped-def]
     centers, radii, order, starts, first_cell, cells, largest, begin, lengths, periodic, gap, relative, images
 ):
     """Pairs found by every particle in the grids of its own and of the larger classes."""

@@ -96,7 +96,8 @@ class ParticlePacking:
         return ParticlePacking(self.centers, radii, self.box)
 
 
-def _refuse_first(bad: NDArray[np.bool_], what: str, values: NDArray[np.float64]) -> None:
+def _refuse_first(bad: NDArray[np.bool_] | np.bool_, what: str, values: NDArray[np.float64]) -> None:
+    bad = np.asarray(bad)
     if bad.any():
         row = int(np.flatnonzero(bad)[0])
         others = int(bad.sum()) - 1

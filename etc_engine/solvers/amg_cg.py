@@ -118,7 +118,7 @@ def _factorise(matrix: csr_matrix) -> Callable[[NDArray[np.float64]], NDArray[np
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    return lambda residual: factor.solve(residual)
+    return lambda residual: np.asarray(factor.solve(residual))
 
 
 def solve_energy(
@@ -191,7 +191,14 @@ def solve_energy(
     def report(error: float, imbalance: float) -> SolveReport:
         seconds = time.perf_counter() - start
         return SolveReport(
-            rhs.size, preconditioner.levels, len(steps), error, history[-1], imbalance, preconditioner.seconds, seconds
+            rhs.size,
+            preconditioner.levels,
+            len(steps),
+            error,
+            history[-1],
+            imbalance,
+            preconditioner.seconds,
+            seconds,
         )
 
     if rho == 0.0:
@@ -208,7 +215,7 @@ def solve_energy(
         z = preconditioner.apply(r)
         rho_next = float(r @ z)
         ratios.append(rho_next / rho)
-        # b . u = (b + r_0 part): with a starting guess the energy is E_lift - 2 b.u + u.K u
+        # E_lift - 2 b.u + u.K u, which holds for any iterate
         energy = lift_energy - float(u @ (rhs + r))
         error = max(radau_factor(steps, ratios) * rho_next, 0.0) / energy if energy > 0.0 else np.inf
         imbalance = abs(float(r.sum())) / energy if energy > 0.0 else np.inf

@@ -39,9 +39,7 @@ def test_help_lists_commands_and_loads_nothing_heavy():
 def test_help_is_fast():
     started = time.perf_counter()
     assert etc_engine("--help").returncode == 0
-    assert (
-        time.perf_counter() - started < 2.0
-    )  # 0.1 s on an idle machine; the bound leaves room for a busy one
+    assert time.perf_counter() - started < 2.0  # 0.1 s on an idle machine; the bound leaves room for a busy one
 
 
 def test_each_command_has_help():

@@ -42,7 +42,7 @@ def brute_force(packing, gap, relative_gap, span=4):
     gap=st.sampled_from([0.0, 0.05, 0.3]),
     relative_gap=st.sampled_from([0.0, 0.4]),
 )
-def test_pairs_equal_brute_force(seed, dimension, count, size_ratio, largest, gap, relative_gap):  # noqa: PLR0917
+def test_pairs_equal_brute_force(seed, dimension, count, size_ratio, largest, gap, relative_gap):
     rng = np.random.default_rng(seed)
     box = Box(tuple(rng.uniform(0.5, 2.0, dimension)), tuple(rng.random(dimension) < 0.6))
     radii = largest * size_ratio ** -rng.random(count)

@@ -1,0 +1,73 @@
+"""What several commands share: reading option words, and writing results without leaving halves behind."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from etc_engine.box import Box, parse_periodic
+from etc_engine.errors import InputError, OutputError
+
+
+def parse_box(lengths: str, periodic: str) -> Box:
+    """A box from the words of ``--box 1,1`` and ``--periodic xy``."""
+    try:
+        edges = tuple(float(word) for word in lengths.split(","))
+    except ValueError:
+        raise InputError(f"--box takes edge lengths separated by commas, such as 1,1: found {lengths!r}") from None
+    return Box(edges, parse_periodic(periodic, len(edges)))
+
+
+def print_json(record: dict[str, Any]) -> None:
+    """One JSON object on stdout; NaN becomes null."""
+    click.echo(json.dumps(_plain(record)))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+@contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """A temporary neighbour of a file that takes its place when the block ends well, and vanishes otherwise.
+
+    Raises
+    ------
+    OutputError
+        If the place cannot be written to.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise OutputError(f"cannot write {path}: it is a directory")
+    try:
+        handle, name = tempfile.mkstemp(dir=path.parent or Path(), prefix=f".{path.name}.", suffix=path.suffix)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        temporary.unlink(missing_ok=True)
