@@ -100,7 +100,7 @@ def build_preconditioner(matrix: csr_matrix, exact_level: int = EXACT_LEVEL) -> 
         from pyamg import smoothed_aggregation_solver
 
         hierarchy = smoothed_aggregation_solver(
-            matrix,
+            matrix.sorted_indices(),  # aggregates follow the order of the columns
             strength=("symmetric", {"theta": 0.08}),
             smooth=("jacobi", {"weighting": "local"}),
             improve_candidates=None,
