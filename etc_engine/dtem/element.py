@@ -5,8 +5,8 @@ With arc temperatures T_e, heat flows into the disk Q_e and the mean temperature
     T_e = T_o e + H Q_e,    e . Q_e = 0    =>    Q_e = K_e T_e.
 
 K_e lives on differences of temperatures: with P = [I; -1 ... -1] (n x (n-1)) the zero-sum heat flows
-are Q = P y, and K_e = P (P^T H P)^{-1} P^T. That equals K_hat - g g^T / kappa_e of the literature, needs
-one small Cholesky factor, and cannot see a constant added to H.
+are Q = P y, and K_e = P (P^T H P)^{-1} P^T. That equals K_hat - g g^T / kappa_e of Feng et al. 2008 (Eq. 30),
+needs one small Cholesky factor, and cannot see a constant added to H.
 """
 
 from __future__ import annotations
@@ -17,64 +17,56 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.contacts import ContactNetwork
-from etc_engine.dtem.resistance import mutual_resistance_scalar, self_resistance
+from etc_engine.dtem.sides import ContactSides
 from etc_engine.errors import GeometryError
 
 
 @dataclass(frozen=True, eq=False)
-class ContactSides:
-    """The contacts as each particle sees them, sorted by particle.
+class Material:
+    """What the particles and their contacts are made of.
 
     Parameters
     ----------
-    offsets : ndarray of int, shape (n + 1,)
-        The sides of particle p are rows ``offsets[p]`` to ``offsets[p + 1]``.
-    nodes : ndarray of int, shape (s,)
-        Contact of each side: particle contacts first, wall contacts after them.
-    arms : ndarray, shape (s, d) [m]
-        Vector from the particle's centre towards the contact; at the two sides of a particle contact they
-        differ by the branch vector.
-    theta : ndarray, shape (s,) [rad]
-        Position angle of the contact.
-    alpha : ndarray, shape (s,) [rad]
-        Half-angle of the contact's arc.
-    of_contacts : ndarray of int, shape (m, 2)
-        The two sides of each particle contact.
-    of_walls : ndarray of int, shape (w,)
-        The side of each wall contact.
+    conductivity : ndarray, shape (n,) [W/(m K)]
+        Of each particle.
+    contact_resistance : ndarray, shape (contacts,) [m K/W]
+        Total resistance of each contact per unit thickness, particle contacts first, wall contacts after them.
     """
 
-    offsets: NDArray[np.int64]
-    nodes: NDArray[np.int64]
-    arms: NDArray[np.float64]
-    theta: NDArray[np.float64]
-    alpha: NDArray[np.float64]
-    of_contacts: NDArray[np.int64]
-    of_walls: NDArray[np.int64]
+    conductivity: NDArray[np.float64]
+    contact_resistance: NDArray[np.float64]
 
-    @property
-    def particles(self) -> NDArray[np.int64]:
-        """Particle of each side, shape (s,)."""
-        return np.repeat(np.arange(self.offsets.size - 1), np.diff(self.offsets))
+    def side_resistances(self, sides: ContactSides) -> NDArray[np.float64]:
+        """Part of the contact resistance that belongs to each side, shape (s,).
+
+        Half of it at either side of a particle contact, all of it at the one side of a wall contact.
+        """
+        number = np.bincount(sides.nodes, minlength=self.contact_resistance.size)
+        return (self.contact_resistance / np.maximum(number, 1))[sides.nodes]
 
 
 @dataclass(frozen=True, eq=False)
 class Elements:
     """Element conductivity matrices, packed.
 
+    A method may resolve the flux over a contact in several modes; every mode of a contact is a node, and mode
+    0 carries its whole heat flow. Rows run over the contact sides of a particle, modes fastest.
+
     Parameters
     ----------
+    modes : int
+        Modes of every contact, M.
     offsets : ndarray of int, shape (n + 1,)
         Rows of element p: ``offsets[p]`` to ``offsets[p + 1]``.
     nodes : ndarray of int, shape (rows,)
-        Global node of each row. A node has at most two rows.
+        Global node of each row, M times its contact plus its mode. A node has at most two rows.
     starts : ndarray of int, shape (n + 1,)
         Element p is ``values[starts[p]:starts[p + 1]]``, a square matrix row by row.
     values : ndarray [W/K per unit thickness]
         The matrices.
     """
 
+    modes: int
     offsets: NDArray[np.int64]
     nodes: NDArray[np.int64]
     starts: NDArray[np.int64]
@@ -85,226 +77,105 @@ class Elements:
         return _apply(self.offsets, self.starts, self.values, np.ascontiguousarray(temperatures))
 
 
-def contact_sides(network: ContactNetwork) -> ContactSides:
-    """The two sides of every particle contact and the one side of every wall contact, by particle."""
-    packing, m = network.packing, network.count
-    radii = packing.radii[network.pairs]
-    share = radii[:, :1] / radii.sum(axis=1, keepdims=True)
-    normals = np.zeros((network.walls.size, packing.dimension))
-    normals[np.arange(network.walls.size), network.walls // 2] = 2.0 * (network.walls % 2) - 1.0
-    owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
-    nodes = np.concatenate([np.arange(m), np.arange(m), m + np.arange(network.walls.size)])
-    arms = np.concatenate(
-        [
-            network.branches * share,
-            -network.branches * (1.0 - share),
-            normals * packing.radii[network.wall_particles, None],
-        ]
-    )
-    alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
-    order = np.argsort(owner, kind="stable")
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=packing.count))])
-    place = np.empty_like(order)
-    place[order] = np.arange(order.size)
-    arms = arms[order]
-    return ContactSides(
-        offsets=offsets,
-        nodes=nodes[order],
-        arms=arms,
-        theta=np.arctan2(arms[:, 1], arms[:, 0]),
-        alpha=alpha[order],
-        of_contacts=place[: 2 * m].reshape(2, m).T,
-        of_walls=place[2 * m :],
-    )
+def packed_starts(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Where each square matrix begins in a packed array, for elements of ``offsets[p + 1] - offsets[p]`` rows."""
+    return np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
 
 
-def side_resistances(
-    sides: ContactSides,
-    method: str,
-    conductivity: NDArray[np.float64],
-    contact_resistance: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Diagonal of H at every side: h_ii of the method, and the side's share of the contact resistance.
-
-    Parameters
-    ----------
-    sides : ContactSides
-    method : str
-        ``standard``, ``enhanced`` or ``chord``.
-    conductivity : ndarray, shape (n,) [W/(m K)]
-        Conductivity of each particle.
-    contact_resistance : ndarray, shape (nodes,) [m K/W]
-        Resistance of each contact per unit thickness: half of it goes to either side of a particle
-        contact, all of it to the one side of a wall contact.
-
-    Returns
-    -------
-    ndarray, shape (s,) [m K/W]
-    """
-    resistance = self_resistance(sides.alpha, method) / conductivity[sides.particles]
-    if contact_resistance.any():
-        sides_of_node = np.bincount(sides.nodes, minlength=contact_resistance.size)
-        resistance += (contact_resistance / np.maximum(sides_of_node, 1))[sides.nodes]
-    return resistance
-
-
-def element_matrices(sides: ContactSides, diagonal: NDArray[np.float64], conductivity: NDArray[np.float64]) -> Elements:
-    """Conductivity matrices of all disks.
-
-    Parameters
-    ----------
-    sides : ContactSides
-    diagonal : ndarray, shape (s,) [m K/W]
-        Self-resistance h_ii of every side (`side_resistances`).
-    conductivity : ndarray, shape (n,) [W/(m K)]
-
-    Returns
-    -------
-    Elements
-
-    Raises
-    ------
-    GeometryError
-        If two arcs of a disk overlap, or are so wide that its resistance matrix is not positive definite.
-
-    References
-    ----------
-    Feng, Han, Li, Owen 2008, Eqs. 24 to 30, doi:10.1016/j.jcp.2008.01.031.
-    """
-    check_arcs(sides)
-    widths = np.diff(sides.offsets)
-    starts = np.concatenate([[0], np.cumsum(widths**2)])
-    values = np.zeros(int(starts[-1]))
-    bad = _fill_elements(
-        sides.offsets,
-        sides.theta,
-        sides.alpha,
-        diagonal,
-        conductivity,
-        starts,
-        values,
-        int(widths.max(initial=0)),
-    )
-    if bad >= 0:
-        widest = np.degrees(sides.alpha[sides.offsets[bad] : sides.offsets[bad + 1]].max())
-        raise GeometryError(
-            f"the resistance matrix of particle {bad} is not positive definite: its contact arcs (half-angles up to "
-            f"{widest:.4g} degrees) are too wide or too close for this method; use smaller contact angles"
-        )
-    return Elements(sides.offsets, sides.nodes, starts, values)
-
-
-def check_arcs(sides: ContactSides) -> None:
-    """Refuse contact arcs that overlap on one particle.
-
-    Raises
-    ------
-    GeometryError
-        Naming the first particle, the distance of the two arcs and their half-angles.
-    """
-    particle, a, b = _overlapping_arcs(sides.offsets, sides.theta, sides.alpha)
+def refuse_indefinite(particle: int, sides: ContactSides) -> None:
+    """Raise the error of an element whose resistance matrix has no inverse, unless ``particle`` is -1."""
     if particle >= 0:
-        alpha, theta = np.degrees(sides.alpha[[a, b]]), np.degrees(sides.theta[[a, b]])
-        apart = abs((theta[0] - theta[1] + 180.0) % 360.0 - 180.0)
+        widest = np.degrees(sides.alpha[sides.offsets[particle] : sides.offsets[particle + 1]].max())
         raise GeometryError(
-            f"two contact arcs of particle {particle} overlap: {apart:.4g} degrees apart with half-angles "
-            f"{alpha[0]:.4g} and {alpha[1]:.4g}; use smaller contact angles or less overlap"
+            f"the resistance matrix of particle {particle} is not positive definite: its contact arcs (half-angles up "
+            f"to {widest:.4g} degrees) are too wide or too close for this method; use smaller contact angles"
         )
 
 
 @njit(cache=True)
-def _overlapping_arcs(
-    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]
-) -> tuple[int, int, int]:
-    """First particle with overlapping arcs and the two sides, or -1."""
-    for p in range(offsets.size - 1):
-        for a in range(offsets[p], offsets[p + 1]):
-            for b in range(offsets[p], a):
-                separation = abs(theta[a] - theta[b])
-                if min(separation, 2.0 * np.pi - separation) < alpha[a] + alpha[b]:
-                    return p, a, b
-    return -1, -1, -1
+def condense(
+    h: NDArray[np.float64], size: int, modes: int, work: NDArray[np.float64], out: NDArray[np.float64]
+) -> bool:
+    """K_e = P (P^T H P)^{-1} P^T of one element, row by row into ``out``.
 
-
-@njit(cache=True)
-def _fill_elements(
-    offsets: NDArray[np.int64],
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    diagonal: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
-    widest: int,
-) -> int:
-    """Fill the packed matrices; answers the first particle whose H is not positive definite, or -1."""
-    h = np.empty((widest, widest))
-    inverse = np.empty((widest, widest))
-    for p in range(offsets.size - 1):
-        first, n = offsets[p], offsets[p + 1] - offsets[p]
-        if n < 2:
+    ``h[:size, :size]`` is H; rows ``0, modes, 2 modes, ...`` carry the heat flows that sum to zero, the first row
+    of the last contact is the one left out of the basis. ``work`` has the shape of ``h``. Answers False if
+    P^T H P is not positive definite.
+    """
+    last = size - modes
+    m = 0
+    for i in range(size):
+        if i == last:
             continue
-        for i in range(n):
-            h[i, i] = diagonal[first + i]
-            for j in range(i):
-                a, b = first + i, first + j
-                mutual = mutual_resistance_scalar(theta[a] - theta[b], alpha[a], alpha[b])
-                h[i, j] = mutual / conductivity[p]
-                h[j, i] = h[i, j]
-        if not _invert_on_differences(h, n, inverse):
-            return p
-        out = values[starts[p] : starts[p + 1]]
-        for i in range(n - 1):
-            total = 0.0
-            for j in range(n - 1):
-                out[i * n + j] = inverse[i, j]
-                total += inverse[i, j]
-            out[i * n + n - 1] = -total
-            out[(n - 1) * n + i] = -total
-        corner = 0.0
-        for i in range(n - 1):
-            corner -= out[(n - 1) * n + i]
-        out[n * n - 1] = corner
-    return -1
+        n = 0
+        for j in range(i + 1):
+            if j == last:
+                continue
+            value = h[i, j]
+            if i % modes == 0:
+                value -= h[last, j]
+            if j % modes == 0:
+                value -= h[i, last]
+            if i % modes == 0 and j % modes == 0:
+                value += h[last, last]
+            work[m, n] = value
+            n += 1
+        m += 1
+    if not _cholesky_inverse(work, m):
+        return False
+    out[:] = 0.0
+    row = 0
+    for i in range(size):
+        if i == last:
+            continue
+        column = 0
+        for j in range(size):
+            if j == last:
+                continue
+            value = work[row, column]
+            out[i * size + j] = value
+            if j % modes == 0:
+                out[i * size + last] -= value
+            if i % modes == 0:
+                out[last * size + j] -= value
+            if i % modes == 0 and j % modes == 0:
+                out[last * size + last] += value
+            column += 1
+        row += 1
+    return True
 
 
 @njit(cache=True)
-def _invert_on_differences(h: NDArray[np.float64], n: int, inverse: NDArray[np.float64]) -> bool:
-    """``inverse[:n-1, :n-1]`` = (P^T H P)^{-1} by Cholesky; False if it is not positive definite. Destroys h."""
-    m = n - 1
-    last = h[m, m]
-    for i in range(m):
-        for j in range(i + 1):
-            h[i, j] += last - h[i, m] - h[j, m]
+def _cholesky_inverse(a: NDArray[np.float64], m: int) -> bool:
+    """Invert ``a[:m, :m]`` in place, given its lower triangle; False if it is not positive definite."""
     for j in range(m):
-        pivot = h[j, j]
+        pivot = a[j, j]
         for k in range(j):
-            pivot -= h[j, k] * h[j, k]
+            pivot -= a[j, k] * a[j, k]
         if not pivot > 0.0:
             return False
-        h[j, j] = np.sqrt(pivot)
+        a[j, j] = np.sqrt(pivot)
         for i in range(j + 1, m):
-            value = h[i, j]
+            value = a[i, j]
             for k in range(j):
-                value -= h[i, k] * h[j, k]
-            h[i, j] = value / h[j, j]
-    # the inverse factor in the lower triangle, then L^-T L^-1 into the upper one
-    for j in range(m):
-        inverse[j, j] = 1.0 / h[j, j]
+                value -= a[i, k] * a[j, k]
+            a[i, j] = value / a[j, j]
+    for j in range(m):  # the inverse factor takes the place of the factor, column by column
+        a[j, j] = 1.0 / a[j, j]
         for i in range(j + 1, m):
             value = 0.0
             for k in range(j, i):
-                value -= h[i, k] * inverse[k, j]
-            inverse[i, j] = value / h[i, i]
-    for i in range(m):
+                value -= a[i, k] * a[k, j]
+            a[i, j] = value / a[i, i]
+    for i in range(m):  # L^-T L^-1 into the upper triangle; row i of the factor is read for the last time here
         for j in range(i + 1):
             value = 0.0
             for k in range(i, m):
-                value += inverse[k, i] * inverse[k, j]
-            inverse[j, i] = value
+                value += a[k, i] * a[k, j]
+            a[j, i] = value
     for i in range(m):
         for j in range(i):
-            inverse[i, j] = inverse[j, i]
+            a[i, j] = a[j, i]
     return True
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.dtem.element import ContactSides, contact_sides
-from etc_engine.dtem.resistance import mutual_resistance_scalar
+from etc_engine.dtem.methods import find_method
+from etc_engine.dtem.sides import ContactSides, contact_sides
 from etc_engine.dtem.steady import SteadySolution
 
 
@@ -69,9 +69,9 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
     rows = np.empty(solution.sides.nodes.size, dtype=np.int64)
     rows[solution.sides.of_contacts] = sides.of_contacts[backbone.contacts]
     rows[solution.sides.of_walls] = sides.of_walls[backbone.wall_contacts]
-    flows, diagonal = np.zeros(sides.nodes.size), np.zeros(sides.nodes.size)
-    flows[rows], diagonal[rows] = solution.heat_flows[:, load], solution.resistances
-    potentials = _potentials(sides.offsets, sides.theta, sides.alpha, diagonal, solution.conductivity, flows)
+    flows = np.zeros((sides.nodes.size, solution.flows.shape[1]))
+    flows[rows] = solution.flows[:, :, load]
+    potentials = find_method(solution.method).potentials(sides, solution.material, flows)
 
     owner = sides.particles[rows]
     number = np.bincount(owner, minlength=packing.count)
@@ -98,33 +98,9 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
         particle_temperatures=temperatures,
         contact_temperatures=temperatures[network.pairs[:, 0]] + potentials[sides.of_contacts[:, 0]],
         wall_temperatures=at_wall,
-        contact_flows=flows[sides.of_contacts[:, 1]],
-        wall_flows=-flows[sides.of_walls],
+        contact_flows=flows[sides.of_contacts[:, 1], 0],
+        wall_flows=-flows[sides.of_walls, 0],
     )
-
-
-@njit(cache=True)
-def _potentials(
-    offsets: NDArray[np.int64],
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    diagonal: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-    flows: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """sum_j h_ij Q_j at every side: the temperature of its arc above the particle's mean."""
-    potentials = np.zeros(theta.size)
-    for p in range(offsets.size - 1):
-        for i in range(offsets[p], offsets[p + 1]):
-            for j in range(offsets[p], offsets[p + 1]):
-                if flows[j] == 0.0:
-                    continue
-                if i == j:
-                    potentials[i] += diagonal[i] * flows[i]
-                else:
-                    h = mutual_resistance_scalar(theta[i] - theta[j], alpha[i], alpha[j])
-                    potentials[i] += h / conductivity[p] * flows[j]
-    return potentials
 
 
 @njit(cache=True)

@@ -258,14 +258,14 @@ def chord_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
 
 
 SELF_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
+    "chord": chord_resistance,
     "standard": standard_resistance,
     "enhanced": enhanced_resistance,
-    "chord": chord_resistance,
 }
 
 
 def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
-    """Self-resistance kappa h_ii by the named method: ``standard``, ``enhanced`` or ``chord``.
+    """Self-resistance kappa h_ii by the named method: ``chord``, ``standard`` or ``enhanced``.
 
     Raises
     ------

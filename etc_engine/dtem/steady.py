@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.assembly import LinearSystem, assemble, count_positive_off_diagonals
-from etc_engine.dtem.element import (
-    ContactSides,
-    Elements,
-    check_arcs,
-    contact_sides,
-    element_matrices,
-    side_resistances,
-)
+from etc_engine.dtem.element import Elements, Material
+from etc_engine.dtem.methods import find_method
+from etc_engine.dtem.sides import ContactSides, check_arcs, contact_sides
 from etc_engine.errors import InputError
 from etc_engine.percolation import Backbone, find_backbone
 from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
@@ -37,19 +32,19 @@ class SteadySolution:
         What takes part.
     sides : ContactSides
         The contact sides of the backbone.
-    resistances : ndarray, shape (s,) [m K/W]
-        Diagonal of H at each of them.
-    conductivity : ndarray, shape (n,) [W/(m K)]
-        Conductivity of each particle.
+    method : str
+        Name of the method.
+    material : Material
+        Of the whole network.
     temperatures : ndarray, shape (s, k) [K]
         Node temperature at each side; along a periodic axis measured from the mean gradient at the
         particle's centre.
-    heat_flows : ndarray, shape (s, k) [W/m]
-        Heat flow into the particle at each side.
+    flows : ndarray, shape (s, M, k) [W/m]
+        Flux modes into the particle at each side; mode 0 is the heat flow.
     energies : ndarray, shape (k, k)
         sum_p t_pa . K_p t_pb.
     reports : tuple of SolveReport
-        One a load; empty when nothing spans.
+        One a load.
     positive_off_diagonals : int
         Entries of the matrix that break the M-matrix property.
     """
@@ -58,13 +53,18 @@ class SteadySolution:
     axes: tuple[int, ...]
     backbone: Backbone
     sides: ContactSides
-    resistances: NDArray[np.float64]
-    conductivity: NDArray[np.float64]
+    method: str
+    material: Material
     temperatures: NDArray[np.float64]
-    heat_flows: NDArray[np.float64]
+    flows: NDArray[np.float64]
     energies: NDArray[np.float64]
     reports: tuple[SolveReport, ...]
     positive_off_diagonals: int
+
+    @property
+    def heat_flows(self) -> NDArray[np.float64]:
+        """Heat flow into the particle at each side, shape (s, k) [W/m]."""
+        return self.flows[:, 0, :]
 
 
 def solve_steady(
@@ -89,7 +89,7 @@ def solve_steady(
     axes : tuple of int
         A single walled axis, or periodic axes only.
     method : str
-        ``standard``, ``enhanced`` or ``chord``.
+        A name of `etc_engine.dtem.methods.METHODS`.
     conductivity : float or array_like, shape (n,) [W/(m K)]
         Of all particles, or of each.
     contact_resistance : float or array_like, shape (m + w,) [m K/W]
@@ -112,64 +112,60 @@ def solve_steady(
     ----------
     Feng, Han, Li, Owen 2008, Box 1, doi:10.1016/j.jcp.2008.01.031.
     """
-    conductivity = _positive(conductivity, network.packing.count, "conductivity", zero=False)
-    resistance = _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True)
     if network.packing.dimension != 2:
         raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
+    material = Material(
+        _positive(conductivity, network.packing.count, "conductivity", zero=False),
+        _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True),
+    )
+    variant = find_method(method)
     if backbone is None:
         backbone = find_backbone(network, axes)
+    kept = np.concatenate([backbone.contacts, backbone.wall_contacts])
     reduced = network.select(backbone.contacts, backbone.wall_contacts)
     sides = contact_sides(reduced)
-    kept = np.concatenate([backbone.contacts, backbone.wall_contacts])
+    check_arcs(sides)
     if not kept.all():  # what carries no heat must still be a valid geometry
-        check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), _driven(network, axes))))
-    diagonal = side_resistances(sides, method, conductivity, resistance[kept])
-    elements = element_matrices(sides, diagonal, conductivity)
-    if elements.nodes.size == 0:
-        nothing = np.zeros((0, len(axes)))
-        zero = np.zeros((len(axes), len(axes)))
-        return SteadySolution(network, axes, backbone, sides, diagonal, conductivity, nothing, nothing, zero, (), 0)
+        driven = np.asarray(network.walls // 2 == axes[0])
+        check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), driven)))
+    elements = variant.elements(sides, replace(material, contact_resistance=material.contact_resistance[kept]))
     system = _load(reduced, axes, backbone, sides, elements)
     u, reports = _solve(system, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
     return SteadySolution(
-        network,
-        axes,
-        backbone,
-        sides,
-        diagonal,
-        conductivity,
-        temperatures,
-        flows,
-        temperatures.T @ flows,
-        reports,
-        count_positive_off_diagonals(system.matrix),
+        network=network,
+        axes=axes,
+        backbone=backbone,
+        sides=sides,
+        method=method,
+        material=material,
+        temperatures=temperatures[:: elements.modes],
+        flows=flows.reshape(sides.nodes.size, elements.modes, len(axes)),
+        energies=temperatures.T @ flows,
+        reports=reports,
+        positive_off_diagonals=count_positive_off_diagonals(system.matrix),
     )
 
 
-def _driven(network: ContactNetwork, axes: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Wall contacts with the walls that drive the flow; none around a periodic axis."""
-    return np.asarray(network.walls // 2 == axes[0])
-
-
 def _load(
-    reduced: ContactNetwork,
-    axes: tuple[int, ...],
-    backbone: Backbone,
-    sides: ContactSides,
-    elements: Elements,
+    reduced: ContactNetwork, axes: tuple[int, ...], backbone: Backbone, sides: ContactSides, elements: Elements
 ) -> LinearSystem:
-    """Prescribe the walls of a walled axis, or the jumps of periodic axes with one node pinned a cluster."""
-    m = reduced.count
-    prescribed = np.zeros(m + reduced.walls.size, dtype=np.bool_)
+    """Prescribe the walls of a walled axis, or the jumps of periodic axes with one node pinned a cluster.
+
+    Walls and jumps are uniform over a contact: they load mode 0, and a wall holds the other modes at 0.
+    """
+    m, modes = reduced.count, elements.modes
+    prescribed = np.zeros((m + reduced.walls.size, modes), dtype=np.bool_)
+    lift = np.zeros((sides.nodes.size, modes, len(axes)))
     if reduced.packing.box.periodic[axes[0]]:
         _, first = np.unique(backbone.clusters[reduced.pairs[:, 0]], return_index=True)
-        prescribed[first] = True
-        return assemble(elements, sides.arms[:, list(axes)], prescribed)
-    prescribed[m:] = True
-    wall_temperature = np.concatenate([np.zeros(m), 1.0 - reduced.walls % 2])
-    return assemble(elements, wall_temperature[sides.nodes][:, None], prescribed)
+        prescribed[first, 0] = True
+        lift[:, 0, :] = sides.arms[:, list(axes)]
+    else:
+        prescribed[m:] = True
+        lift[:, 0, 0] = np.concatenate([np.zeros(m), 1.0 - reduced.walls % 2])[sides.nodes]
+    return assemble(elements, lift.reshape(-1, len(axes)), prescribed.ravel())
 
 
 def _solve(system: LinearSystem, tolerance: float) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:

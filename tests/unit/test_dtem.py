@@ -5,9 +5,11 @@ import pytest
 
 from etc_engine.box import Box
 from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.element import contact_sides, element_matrices, side_resistances
+from etc_engine.dtem.closed_form import closed_form_elements
+from etc_engine.dtem.element import Material
 from etc_engine.dtem.field import recover_field
 from etc_engine.dtem.resistance import SELF_RESISTANCE, mutual_resistance, self_resistance
+from etc_engine.dtem.sides import contact_sides, count_close_arcs
 from etc_engine.dtem.steady import solve_steady
 from etc_engine.effective import effective_conductivity, load_groups, wall_heat_flows
 from etc_engine.errors import GeometryError, InputError
@@ -39,8 +41,7 @@ def literature_element(theta, alpha, method):
 def test_element_equals_the_literature_form_is_symmetric_and_semi_definite(feng_particles, method):
     network = overlap_contacts(feng_particles)
     sides = contact_sides(network)
-    ones = np.ones(12)
-    elements = element_matrices(sides, side_resistances(sides, method, ones, np.zeros(25)), ones)
+    elements = closed_form_elements(sides, Material(np.ones(12), np.zeros(network.count + network.walls.size)), method)
     for p in range(12):
         rows = slice(elements.offsets[p], elements.offsets[p + 1])
         n = rows.stop - rows.start
