@@ -106,7 +106,7 @@ def _block(
     kernel: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """kappa H over the modes of two different arcs."""
+    """Kappa H over the modes of two different arcs."""
     modes, number = weights.shape
     for u in range(number):
         for v in range(number):
@@ -128,7 +128,7 @@ def _own_block(
     kernel: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """kappa H over the modes of one arc."""
+    """Kappa H over the modes of one arc."""
     modes, number = weights.shape
     for u in range(number):
         for v in range(number):

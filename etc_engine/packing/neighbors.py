@@ -8,12 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.box import Box
 from etc_engine.errors import InputError
+from etc_engine.packing.cell_grids import cell_grids, cell_of, cell_range
 from etc_engine.packing.particles import ParticlePacking
-
-MAX_LEVELS = 40
-"""Size classes halve from one to the next; radii below 2**-40 of the largest share the last class."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,69 +86,24 @@ def neighbor_pairs(
     d = packing.dimension
     centers = np.zeros((packing.count, 3))
     centers[:, :d] = packing.centers
-    grid = _sort_into_grids(centers, packing.radii, packing.box, float(gap), float(relative_gap))
-    lengths, periodic = _padded_lengths(packing.box), _padded_flags(packing.box)
-    arguments = (centers, packing.radii, *grid, lengths, periodic, float(gap), float(relative_gap), images)
-    i, j, shift, gaps = _search(*arguments)
+    grids = cell_grids(packing.radii, packing.box, gap, relative_gap)
+    i, j, shift, gaps = _search(centers, packing.radii, grids, float(gap), float(relative_gap), images)
     order = _sort_pairs(i, j, shift, packing.count)
     pairs = np.column_stack((i[order], j[order]))
     return NeighborPairs(pairs, shift[order, :d].astype(np.int64), gaps[order])
 
 
-def _padded_lengths(box: Box) -> NDArray[np.float64]:
-    """Edge lengths of the box as three axes; a 2D box gets a third axis of unit length."""
-    return np.array([*box.lengths, *(1.0,) * (3 - box.dimension)])
-
-
-def _padded_flags(box: Box) -> NDArray[np.bool_]:
-    return np.array([*box.periodic, *(False,) * (3 - box.dimension)])
-
-
-def _sort_into_grids(
-    centers: NDArray[np.float64], radii: NDArray[np.float64], box: Box, gap: float, relative_gap: float
-) -> tuple[NDArray, ...]:
-    """Size classes from the largest radius down, and one cell grid for each class.
-
-    Returns
-    -------
-    order : particle row numbers sorted by class, then by cell
-    starts : where each cell's particles start in `order`, all classes one after another
-    first_cell : where each class's cells start in `starts`
-    cells : number of cells of each class along each axis, shape (classes, 3)
-    largest : largest radius of each class
-    begin : where each class starts in `order`
-    """
-    octave = np.floor(np.log2(radii.max() / radii)).astype(np.int64)
-    present, level = np.unique(np.minimum(octave, MAX_LEVELS), return_inverse=True)
-    members = np.bincount(level)
-    largest = np.array([radii[level == k].max() for k in range(present.size)])
-    lengths = _padded_lengths(box)
-    cells = np.ones((present.size, 3), dtype=np.int64)
-    for k in range(present.size):
-        width = 2.0 * largest[k] + gap + relative_gap * largest[k]
-        d = box.dimension
-        # no more than two cells for each particle of the class: memory stays linear, whatever the sizes
-        width = max(width, (box.volume / (2.0 * members[k])) ** (1.0 / d))
-        cells[k, :d] = np.clip(np.floor(lengths[:d] / width), 1, 2 * members[k] + 1)
-    first_cell = np.concatenate(([0], np.cumsum(cells.prod(axis=1))))
-    begin = np.concatenate(([0], np.cumsum(members)))
-    order, starts = _bin(centers, level, cells, first_cell, lengths)
-    return order, starts, first_cell, cells, largest, begin
-
-
 @njit(cache=True)
-def _bin(centers, level, cells, first_cell, lengths):  # type: ignore[no-untyped-def]
-    """Counting sort of the particles by class and cell."""
+def _sort_into_cells(centers, level, cells, first_cell, lengths, classes):  # type: ignore[no-untyped-def]
+    """Counting sort of the particles by class and cell.
+
+    Returns the sorted row numbers, where each cell starts in them, and where each class starts.
+    """
     n = level.size
     starts = np.zeros(first_cell[-1] + 1, dtype=np.int64)
     cell = np.empty(n, dtype=np.int64)
     for i in range(n):
-        k = level[i]
-        index = 0
-        for axis in range(3):
-            c = int(centers[i, axis] / lengths[axis] * cells[k, axis])
-            index = index * cells[k, axis] + min(max(c, 0), cells[k, axis] - 1)
-        cell[i] = first_cell[k] + index
+        cell[i] = cell_of(centers[i, 0], centers[i, 1], centers[i, 2], level[i], cells, first_cell, lengths)
         starts[cell[i] + 1] += 1
     for c in range(starts.size - 1):
         starts[c + 1] += starts[c]
@@ -160,25 +112,17 @@ def _bin(centers, level, cells, first_cell, lengths):  # type: ignore[no-untyped
     for i in range(n):
         order[fill[cell[i]]] = i
         fill[cell[i]] += 1
-    return order, starts
+    begin = np.empty(classes + 1, dtype=np.int64)
+    for k in range(classes + 1):
+        begin[k] = starts[first_cell[k]]
+    return order, starts, begin
 
 
 @njit(cache=True)
-def _cell_range(x, reach, length, count, periodic):  # type: ignore[no-untyped-def]
-    """First and last cell (not wrapped) that a search of the given reach around x has to visit."""
-    low = int(np.floor((x - reach) / length * count))
-    high = int(np.floor((x + reach) / length * count))
-    if not periodic:
-        low, high = max(low, 0), min(high, count - 1)
-        low, high = min(low, count - 1), max(high, 0)
-    return low, high
-
-
-@njit(cache=True)
-def _search(  # type: ignore[no-untyped-def]
-    centers, radii, order, starts, first_cell, cells, largest, begin, lengths, periodic, gap, relative, images
-):
+def _search(centers, radii, grids, gap, relative, images):  # type: ignore[no-untyped-def]  # noqa: PLR0915
     """Pairs found by every particle in the grids of its own and of the larger classes."""
+    level, cells, first_cell, largest, lengths, periodic = grids
+    order, starts, begin = _sort_into_cells(centers, level, cells, first_cell, lengths, largest.size)
     n = radii.size
     capacity = 4 * n + 16
     out_i = np.empty(capacity, dtype=np.int64)
@@ -192,9 +136,9 @@ def _search(  # type: ignore[no-untyped-def]
             for k in range(own + 1):
                 reach = (radii[i] + largest[k]) * (1.0 + 0.5 * relative) + gap
                 reach += 1e-12 * (reach + lengths.max())  # rounding of the cell index must not lose a pair
-                x0, x1 = _cell_range(centers[i, 0], reach, lengths[0], cells[k, 0], periodic[0])
-                y0, y1 = _cell_range(centers[i, 1], reach, lengths[1], cells[k, 1], periodic[1])
-                z0, z1 = _cell_range(centers[i, 2], reach, lengths[2], cells[k, 2], periodic[2])
+                x0, x1 = cell_range(centers[i, 0], reach, lengths[0], cells[k, 0], periodic[0])
+                y0, y1 = cell_range(centers[i, 1], reach, lengths[1], cells[k, 1], periodic[1])
+                z0, z1 = cell_range(centers[i, 2], reach, lengths[2], cells[k, 2], periodic[2])
                 for cx in range(x0, x1 + 1):
                     sx = cx // cells[k, 0]
                     for cy in range(y0, y1 + 1):

@@ -9,7 +9,7 @@ from etc_engine.dtem.closed_form import closed_form_elements
 from etc_engine.dtem.element import Material
 from etc_engine.dtem.field import recover_field
 from etc_engine.dtem.resistance import SELF_RESISTANCE, mutual_resistance, self_resistance
-from etc_engine.dtem.sides import contact_sides, count_close_arcs
+from etc_engine.dtem.sides import contact_sides
 from etc_engine.dtem.steady import solve_steady
 from etc_engine.effective import effective_conductivity, load_groups, wall_heat_flows
 from etc_engine.errors import GeometryError, InputError
