@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -37,7 +38,7 @@ def find_model(name: str) -> Model:
     wanted = name.lower().replace("-", "_").replace(" ", "_")
     close = difflib.get_close_matches(wanted, CATALOGUE, n=3, cutoff=0.6)
     words = {word for word in wanted.split("_") if len(word) > 2}
-    titled = [m.name for m in ENTRIES if words & set(m.title.lower().replace("-", " ").split())]
+    titled = [m.name for m in ENTRIES if words & set(re.findall(r"\w+", m.title.lower()))]
     offers = list(dict.fromkeys(close + titled))[:4]
     hint = f"did you mean {' or '.join(offers)}?" if offers else f"there are: {', '.join(CATALOGUE)}"
     raise InputError(f"there is no model named {name!r}; {hint}")

@@ -244,12 +244,12 @@ EFFECTIVE_MEDIA = (
 )
 
 PLANE_VALIDITY = (
-    "non-touching equal disks in that order; converged to 1e-9 for any contrast up to 0.97 of the touching "
-    "radius, to 1e-6 for superconducting disks at 0.997"
+    "non-touching equal disks in that order; converged to 1e-9 for any contrast up to 0.999 of the touching "
+    "radius, beyond that to 1e-9 for contrasts up to 10"
 )
 SPACE_VALIDITY = (
-    "non-touching equal spheres in that order; converged to 1e-8 for any contrast up to 0.95 of the touching "
-    "radius; at 0.985 to 1e-6 for contrast 10 and 1e-5 for superconducting spheres"
+    "non-touching equal spheres in that order; converged to 1e-8 for any contrast up to 0.99 of the touching "
+    "radius; at 0.999 to 1e-6 for contrast 10 and 2e-3 for superconducting spheres"
 )
 PERRINS = "Perrins, McKenzie and McPhedran, Proc. R. Soc. Lond. A 369, 207 (1979), 10.1098/rspa.1979.0160"
 MCKENZIE = "McKenzie, McPhedran and Derrick, Proc. R. Soc. Lond. A 362, 211 (1978), 10.1098/rspa.1978.0129"

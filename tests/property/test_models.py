@@ -1,5 +1,6 @@
 """Limits, ordering, symmetry, duality and scaling of the conductivity models, for any input."""
 
+import itertools
 import math
 
 import numpy as np
@@ -109,16 +110,13 @@ def test_equal_phases(name, dimension, k, fraction):
     assert conductivity(name, k, k, fraction, dimension) == pytest.approx(k, rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "dimension"), pairs(EQUAL_PHASES))
+@pytest.mark.parametrize(("name", "dimension"), pairs((*MEDIA, *ARRAYS, "russell", "agari_uno")))
 @given(fraction=st.floats(0.43, 0.52), offset=st.sampled_from([-1e-4, -1e-7, 1e-7, 1e-4]))
 @quick
 def test_nearly_equal_phases_mix_linearly(name, dimension, fraction, offset):
     """To first order in the contrast every isotropic two-phase geometry gives the mean: dk/dk2 = f."""
     k = conductivity(name, 1.0, 1.0 + offset, fraction, dimension)
-    if name in ("krupiczka", "woodside_messmer", "kunii_smith", "hadley"):  # fitted: not exact to this order
-        assert abs(k - 1.0) < 1.5 * abs(offset)
-    else:
-        assert k - 1.0 == pytest.approx(fraction * offset, rel=3.0 * abs(offset) + 1e-7)
+    assert k - 1.0 == pytest.approx(fraction * offset, rel=3.0 * abs(offset) + 1e-7)
 
 
 @given(k1=conductivities, k2=conductivities, fraction=fractions, dimension=dimensions, zeta2=fractions)
@@ -132,7 +130,7 @@ def test_bounds_nest(k1, k2, fraction, dimension, zeta2):
         conductivity("hashin_shtrikman_upper", k1, k2, fraction, dimension),
         conductivity("parallel", k1, k2, fraction, dimension),
     ]
-    for lower, upper in zip(order, order[1:], strict=False):
+    for lower, upper in itertools.pairwise(order):
         assert lower <= upper * (1.0 + 1e-12)
 
 
@@ -195,9 +193,12 @@ def test_conductivities_scale(name, dimension, scale, fraction):
 
 
 @pytest.mark.parametrize(("name", "dimension"), pairs((*MEDIA, *ARRAYS, "russell")))
-@given(k1=conductivities, k2=conductivities, fraction=st.floats(0.0, 0.5), more=st.floats(1.0, 10.0))
+@given(
+    phases=st.tuples(conductivities, conductivities), fraction=st.floats(0.0, 0.5), more=st.floats(1.0, 10.0)
+)
 @quick
-def test_a_better_phase_never_worsens_it(name, dimension, k1, k2, fraction, more):
+def test_a_better_phase_never_worsens_it(name, dimension, phases, fraction, more):
+    k1, k2 = phases
     k = conductivity(name, k1, k2, fraction, dimension)
     assert conductivity(name, k1, k2 * more, fraction, dimension) >= k * (1.0 - 1e-10)
     assert conductivity(name, k1 * more, k2, fraction, dimension) >= k * (1.0 - 1e-10)

@@ -1,8 +1,8 @@
 """Ordered arrays against reference values, an independent numerical solution, and published expansions.
 
-The reference figures to eight digits were computed apart from this code, by converged multipole solutions in the
-manner of Perrins, McKenzie and McPhedran (1979), 10.1098/rspa.1979.0160 (disks), and McPhedran and McKenzie (1978),
-10.1098/rspa.1978.0031 (spheres).
+The reference figures to eight digits were computed apart from this code, by converged multipole solutions
+in the manner of Perrins, McKenzie and McPhedran (1979), 10.1098/rspa.1979.0160 (disks), and McPhedran and
+McKenzie (1978), 10.1098/rspa.1978.0031 (spheres).
 """
 
 import time
@@ -53,32 +53,37 @@ def test_single_inclusion_of_a_third_of_the_box():
     np.testing.assert_allclose(arrays.simple_cubic(1.0, contrast, fraction), expected, rtol=0, atol=5.1e-9)
 
 
-@pytest.mark.parametrize(
-    ("function", "lattice", "bound"),
-    [(arrays.square_array, SQUARE, 0.7), (arrays.hexagonal_array, HEXAGONAL, 0.8)],
-)
-def test_disk_arrays_are_converged(function, lattice, bound):
-    """Twice the multipole order changes nothing at 1e-9, even for superconducting disks."""
-    fraction = np.linspace(0.05, bound, 8)
-    size = np.sqrt(fraction / lattice.touching_fraction)
-    one, infinite = np.ones(8), np.full(8, INF)
+def _at_order(lattice, order, contrast, size):
+    """The array's conductivity with a given highest multipole, whatever the solver would choose."""
+    d, fraction = lattice.dimension, lattice.touching_fraction * size**lattice.dimension
     with np.errstate(invalid="ignore"):
-        x = fraction * arrays._dipole(lattice, 121, one, infinite, size)
-    np.testing.assert_allclose(function(1.0, INF, fraction), (1.0 + x) / (1.0 - x), rtol=1e-9)
+        dipole = arrays._dipole(lattice, order, np.ones(size.size), np.full(size.size, contrast), size)
+    return fraction, (1.0 + (d - 1) * fraction * dipole) / (1.0 - fraction * dipole)
 
 
 @pytest.mark.parametrize(
-    ("function", "lattice"),
-    [(arrays.simple_cubic, SIMPLE_CUBIC), (arrays.bcc, BCC), (arrays.fcc, FCC)],
+    ("function", "lattice"), [(arrays.square_array, SQUARE), (arrays.hexagonal_array, HEXAGONAL)]
+)
+def test_disk_arrays_are_converged(function, lattice):
+    """Twice the multipoles change nothing at the catalogue's 1e-9, even for superconducting disks."""
+    size = np.array([0.3, 0.5, 0.79, 0.81, 0.94, 0.96, 0.979, 0.99, 0.999])
+    fraction, k = _at_order(lattice, 499, INF, size)
+    np.testing.assert_allclose(function(1.0, INF, fraction), k, rtol=1e-9)
+    fraction, k = _at_order(lattice, 499, 10.0, np.array([0.9999]))
+    np.testing.assert_allclose(function(1.0, 10.0, fraction), k, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("function", "lattice"), [(arrays.simple_cubic, SIMPLE_CUBIC), (arrays.bcc, BCC), (arrays.fcc, FCC)]
 )
 def test_sphere_arrays_are_converged(function, lattice):
-    """A higher multipole order changes nothing at the figure the catalogue states (0.95 of touching)."""
-    size = np.array([0.4, 0.6, 0.84, 0.91, 0.95])
-    fraction = lattice.touching_fraction * size**3
-    one, infinite = np.ones(5), np.full(5, INF)
-    with np.errstate(invalid="ignore"):
-        x = fraction * arrays._dipole(lattice, 45, one, infinite, size)
-    np.testing.assert_allclose(function(1.0, INF, fraction), (1.0 + 2.0 * x) / (1.0 - x), rtol=1e-8)
+    """More multipoles change nothing at the figures that the catalogue states."""
+    size = np.array([0.4, 0.69, 0.71, 0.84, 0.86, 0.92, 0.94, 0.97, 0.99])
+    fraction, k = _at_order(lattice, 81, INF, size)
+    np.testing.assert_allclose(function(1.0, INF, fraction), k, rtol=1e-8)
+    for contrast, tolerance in ((10.0, 1e-6), (INF, 2e-3)):
+        fraction, k = _at_order(lattice, 81, contrast, np.array([0.999]))
+        np.testing.assert_allclose(function(1.0, contrast, fraction), k, rtol=tolerance)
 
 
 def test_known_lattice_sums():
@@ -130,14 +135,15 @@ def test_square_array_against_finite_volumes():
 @pytest.mark.parametrize(
     ("function", "coefficient"),
     # c of k/k1 = 1 + 3 f / (1/beta - f - c f^(10/3) - O(f^(14/3))) for superconducting spheres: McKenzie,
-    # McPhedran and Derrick (1978), 10.1098/rspa.1978.0129, and Sangani and Acrivos, Proc. R. Soc. A 386, 263 (1983).
+    # McPhedran and Derrick (1978), 10.1098/rspa.1978.0129; Sangani and Acrivos, Proc. R. Soc. A 386, 263
+    # (1983). The tolerance is half a unit of their last digit.
     [(arrays.simple_cubic, 1.3047), (arrays.bcc, 0.129), (arrays.fcc, 0.0753)],
 )
 def test_leading_correction_to_maxwell_of_cubic_arrays(function, coefficient):
     f = 0.003  # small enough for the next term, large enough for the digits
     k = function(1.0, INF, f)
     c = (1.0 - f - 3.0 * f / (k - 1.0)) / f ** (10.0 / 3.0)
-    assert c == pytest.approx(coefficient, rel=3e-3)
+    assert c == pytest.approx(coefficient, rel=4e-3)
 
 
 def test_a_thousand_evaluations_are_quick():
@@ -145,7 +151,7 @@ def test_a_thousand_evaluations_are_quick():
     for function in (arrays.square_array, arrays.hexagonal_array):
         start = time.perf_counter()
         function(1.0, 50.0, fraction)
-        assert time.perf_counter() - start < 2.0
+        assert time.perf_counter() - start < 2.0  # measured 0.05 s; the margin is for a busy machine
     start = time.perf_counter()
     arrays.simple_cubic(1.0, 50.0, np.linspace(0.01, 0.5, 1000))
     assert time.perf_counter() - start < 4.0

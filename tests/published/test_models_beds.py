@@ -1,6 +1,7 @@
 """Packed-bed and network models: k_f = 1, k_s = 100, porosity 0.4, and the printed equations.
 
-The reference figures were computed apart from this code from the published equations (sources: the catalogue).
+The reference figures were computed apart from this code from the published equations (sources in the
+catalogue).
 """
 
 import numpy as np
@@ -141,7 +142,7 @@ def test_mean_field_of_unequal_disks_is_the_affine_energy():
 
 
 def test_kirkpatrick_square_lattice():
-    """g = 2p - 1 above the threshold 1/2 on the square lattice, Kirkpatrick (1973), 10.1103/RevModPhys.45.574."""
+    """g = 2p - 1 above 1/2 on the square lattice, Kirkpatrick (1973), 10.1103/RevModPhys.45.574."""
     p = np.array([0.2, 0.5, 0.6, 0.9])
     k = evaluate("kirkpatrick", k1=0.0, k2=1.0, fraction=p, dimension=2, coordination=4.0)
     np.testing.assert_allclose(k, [0.0, 0.0, 0.2, 0.8], atol=1e-15)

@@ -1,6 +1,7 @@
 """Composite models for epoxy/silica, k1 = 0.195 and k2 = 1.5 W/(m K), against reference values.
 
-The six-digit figures were computed apart from this code from the published equations (sources: the catalogue).
+The six-digit figures were computed apart from this code from the published equations (sources in the
+catalogue).
 """
 
 import numpy as np
