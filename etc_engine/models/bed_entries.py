@@ -136,15 +136,10 @@ NETWORKS = (
         (
             Input("fraction", "density: full particle measures over that of the box", "-", UNIT),
             Input("coordination", "mean coordination number", "-", FROM_ZERO),
-            Input(
-                "conductance_distance2", "mean of C d^2 over contacts", "W m/K (2D), W m2/K (3D)", FROM_ZERO
-            ),
-            Input(
-                "radius_moment", "mean of R^2 (2D) or R^3 (3D) over particles", "m2 (2D), m3 (3D)", POSITIVE
-            ),
+            Input("conductance_distance2", "mean of C d^2 over contacts", "W m/K (2D), W m2/K (3D)", FROM_ZERO),
+            Input("radius_moment", "mean of R^2 (2D) or R^3 (3D) over particles", "m2 (2D), m3 (3D)", POSITIVE),
         ),
-        "an upper bound (half or third of the trace) of the periodic network of those conductances; pores "
-        "insulate",
+        "an upper bound (half or third of the trace) of the periodic network of those conductances; pores insulate",
         "phi Z C/pi (2D), phi Z C/(2 pi R) (3D) for equal touching particles",
         "Batchelor and O'Brien, Proc. R. Soc. Lond. A 355, 313 (1977), 10.1098/rspa.1977.0100",
     ),

@@ -55,11 +55,7 @@ def elementwise(function: Callable[..., Floats]) -> Callable[..., Values]:
     def formula(*args: Values, **kwargs: Values) -> Values:
         bound = signature.bind(*args, **kwargs)
         bound.apply_defaults()
-        numbers = {
-            name: value
-            for name, value in bound.arguments.items()
-            if name != "dimension" and value is not None
-        }
+        numbers = {name: value for name, value in bound.arguments.items() if name != "dimension" and value is not None}
         blank = _common_labels(list(numbers.values()))
         if blank is not None:
             numbers = {name: blank + value for name, value in numbers.items()}

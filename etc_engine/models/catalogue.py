@@ -44,9 +44,7 @@ def find_model(name: str) -> Model:
     raise InputError(f"there is no model named {name!r}; {hint}")
 
 
-def evaluate(
-    name: str, *, k1: Values, k2: Values, fraction: Values, dimension: int, **parameters: Values
-) -> Values:
+def evaluate(name: str, *, k1: Values, k2: Values, fraction: Values, dimension: int, **parameters: Values) -> Values:
     """Effective conductivity by the named model, with its inputs checked.
 
     Parameters

@@ -203,9 +203,7 @@ EFFECTIVE_MEDIA = (
             K2,
             FRACTION,
             Input("shape_factor", "A (left out: 0.5 in 2D, 1.5 in 3D)", "-", POSITIVE),
-            Input(
-                "maximum_fraction", "phi_m (left out: 0.82 in 2D, 0.637 in 3D)", "-", Interval(0, 1, "high")
-            ),
+            Input("maximum_fraction", "phi_m (left out: 0.82 in 2D, 0.637 in 3D)", "-", Interval(0, 1, "high")),
         ),
         "filled polymers up to the maximum fraction; with A = 1.5 it breaks the lower Hashin-Shtrikman bound "
         "at small fractions",

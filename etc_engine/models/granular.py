@@ -29,9 +29,7 @@ def _unit_cell(k1: Floats, k2: Floats, fraction: Floats, shape_factor: Floats | 
 
 
 @elementwise
-def zehner_schluender(
-    k1: Floats, k2: Floats, fraction: Floats, shape_factor: Floats | float = 1.25
-) -> Floats:
+def zehner_schluender(k1: Floats, k2: Floats, fraction: Floats, shape_factor: Floats | float = 1.25) -> Floats:
     r"""Bed of particles in point contact: a unit cell of fluid beside a core of shaped particles.
 
     .. math:: \frac{k}{k_1} = 1 - \sqrt{f} + \frac{2 \sqrt{f}}{h} \left[
@@ -258,9 +256,7 @@ def krupiczka(k1: Floats, k2: Floats, fraction: Floats) -> Floats:
 
 
 @elementwise
-def woodside_messmer(
-    k1: Floats, k2: Floats, fraction: Floats, fluid_in_series: Floats | float = 0.03
-) -> Floats:
+def woodside_messmer(k1: Floats, k2: Floats, fraction: Floats, fluid_in_series: Floats | float = 0.03) -> Floats:
     r"""Unconsolidated sand: fluid in parallel with solid and fluid in series (three resistors).
 
     .. math:: k = (\varepsilon - \delta) k_1

@@ -117,9 +117,7 @@ class Model:
         declared = {item.name for item in self.inputs}
         taken = set(inspect.signature(self.function).parameters) - {"dimension"}
         if declared != taken:
-            raise TypeError(
-                f"model {self.name} declares {sorted(declared)}, its formula takes {sorted(taken)}"
-            )
+            raise TypeError(f"model {self.name} declares {sorted(declared)}, its formula takes {sorted(taken)}")
 
     @property
     def rigorous(self) -> bool:
@@ -136,9 +134,7 @@ class Model:
         """Values of the inputs that may be left out; None stands for one the formula finds itself."""
         arguments = inspect.signature(self.function).parameters.values()
         return {
-            argument.name: argument.default
-            for argument in arguments
-            if argument.default is not inspect.Parameter.empty
+            argument.name: argument.default for argument in arguments if argument.default is not inspect.Parameter.empty
         }
 
     @property

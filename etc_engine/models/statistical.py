@@ -45,9 +45,7 @@ def _zeta2(zeta2: Floats | None, fraction: Floats, dimension: int) -> Floats:
 
 
 @elementwise
-def third_order(
-    k1: Floats, k2: Floats, fraction: Floats, zeta2: Floats | None = None, *, dimension: int
-) -> Floats:
+def third_order(k1: Floats, k2: Floats, fraction: Floats, zeta2: Floats | None = None, *, dimension: int) -> Floats:
     r"""Third-order expansion about Maxwell's structure, for dispersions of disks or spheres.
 
     .. math:: \frac{k}{k_1} = \frac{1 + (d - 1) f \beta - (d - 1)(1 - f) \zeta_2 \beta^2}
@@ -117,7 +115,7 @@ def three_point_lower(
     ----------
     M. J. Beran, Nuovo Cimento 38, 771 (1965).
     G. W. Milton, Phys. Rev. Lett. 46, 542 (1981), 10.1103/PhysRevLett.46.542.
-    S. Torquato, *Random Heterogeneous Materials* (2002), section 21.2, 10.1007/978-1-4757-6355-3.
+    S. Torquato, *Random Heterogeneous Materials* (2002), 10.1007/978-1-4757-6355-3.
 
     Examples
     --------

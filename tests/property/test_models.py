@@ -193,9 +193,7 @@ def test_conductivities_scale(name, dimension, scale, fraction):
 
 
 @pytest.mark.parametrize(("name", "dimension"), pairs((*MEDIA, *ARRAYS, "russell")))
-@given(
-    phases=st.tuples(conductivities, conductivities), fraction=st.floats(0.0, 0.5), more=st.floats(1.0, 10.0)
-)
+@given(phases=st.tuples(conductivities, conductivities), fraction=st.floats(0.0, 0.5), more=st.floats(1.0, 10.0))
 @quick
 def test_a_better_phase_never_worsens_it(name, dimension, phases, fraction, more):
     k1, k2 = phases

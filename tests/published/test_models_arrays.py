@@ -61,9 +61,7 @@ def _at_order(lattice, order, contrast, size):
     return fraction, (1.0 + (d - 1) * fraction * dipole) / (1.0 - fraction * dipole)
 
 
-@pytest.mark.parametrize(
-    ("function", "lattice"), [(arrays.square_array, SQUARE), (arrays.hexagonal_array, HEXAGONAL)]
-)
+@pytest.mark.parametrize(("function", "lattice"), [(arrays.square_array, SQUARE), (arrays.hexagonal_array, HEXAGONAL)])
 def test_disk_arrays_are_converged(function, lattice):
     """Twice the multipoles change nothing at the catalogue's 1e-9, even for superconducting disks."""
     size = np.array([0.3, 0.5, 0.79, 0.81, 0.94, 0.96, 0.979, 0.99, 0.999])
@@ -87,7 +85,7 @@ def test_sphere_arrays_are_converged(function, lattice):
 
 
 def test_known_lattice_sums():
-    # Cubic lattice sums of degree 4, direct summation over 60 shells with the smooth remainder removed.
+    # Degree 4 by direct summation over a ball of radius 60, where the angular average hides the slow tail.
     n = np.mgrid[-60:61, -60:61, -60:61].reshape(3, -1).T.astype(float)
     r = np.linalg.norm(n, axis=1)
     inside = (r > 0) & (r <= 60)

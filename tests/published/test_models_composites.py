@@ -52,7 +52,7 @@ def test_lewis_nielsen_breaks_the_lower_bound_at_small_fractions():
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_three_point_bounds_in_their_defining_form(dimension):
-    """<k> - f1 f2 (k2 - k1)^2 / (f2 k1 + f1 k2 + (d - 1) X), as printed in Torquato (2002), section 21.2."""
+    """<k> - f1 f2 (k2 - k1)^2 / (f2 k1 + f1 k2 + (d - 1) X), as printed in Torquato (2002)."""
     f, zeta = FRACTION, np.array([0.0, 0.1, 0.3, 0.6, 1.0])
     mean, swapped = (1 - f) * EPOXY + f * SILICA, f * EPOXY + (1 - f) * SILICA
     for name, x in (
@@ -68,12 +68,8 @@ def test_hasselman_johnson_as_printed():
     """Equation for spheres of Hasselman and Johnson (1987), 10.1177/002199838702100602."""
     k1, k2, a, h, f = 0.8, 5.0, 2e-6, 3e6, np.array([0.05, 0.2, 0.4])
     r = k2 / (a * h)
-    printed = k1 * (
-        (2 * (k2 / k1 - r - 1) * f + k2 / k1 + 2 * r + 2) / ((1 - k2 / k1 + r) * f + k2 / k1 + 2 * r + 2)
-    )
-    k = evaluate(
-        "hasselman_johnson", k1=k1, k2=k2, fraction=f, dimension=3, radius=a, interface_conductance=h
-    )
+    printed = k1 * ((2 * (k2 / k1 - r - 1) * f + k2 / k1 + 2 * r + 2) / ((1 - k2 / k1 + r) * f + k2 / k1 + 2 * r + 2))
+    k = evaluate("hasselman_johnson", k1=k1, k2=k2, fraction=f, dimension=3, radius=a, interface_conductance=h)
     np.testing.assert_allclose(k, printed, rtol=1e-13)
 
 
@@ -81,6 +77,4 @@ def test_russell_is_layers_of_cubes_and_matrix():
     k1, k2, side = 2.0, 9.0, 0.6
     layer = side**2 * k2 + (1 - side**2) * k1
     expected = 1.0 / (side / layer + (1 - side) / k1)
-    assert evaluate("russell", k1=k1, k2=k2, fraction=side**3, dimension=3) == pytest.approx(
-        expected, rel=1e-13
-    )
+    assert evaluate("russell", k1=k1, k2=k2, fraction=side**3, dimension=3) == pytest.approx(expected, rel=1e-13)
