@@ -11,6 +11,7 @@ import click
 import pytest
 
 from etc_engine import cli
+from etc_engine.cli.threads import THREAD_VARIABLES
 from etc_engine.errors import InputError
 
 
@@ -79,6 +80,7 @@ def test_what_a_command_raises_becomes_one_line(monkeypatch, capsys, error, stat
         raise error
 
     monkeypatch.setattr(cli.CommandTable, "get_command", lambda *_: failing)
+    monkeypatch.setattr(cli, "hold_one_thread", lambda: None)  # the environment is this process's
     monkeypatch.delenv("ETC_ENGINE_TRACEBACK", raising=False)
     assert cli.run(["failing"]) == status
     captured = capsys.readouterr()
@@ -91,11 +93,12 @@ def test_what_a_command_raises_becomes_one_line(monkeypatch, capsys, error, stat
 def test_what_a_command_returns_is_the_exit_status(monkeypatch):
     command = click.command("four")(lambda: 4)
     monkeypatch.setattr(cli.CommandTable, "get_command", lambda *_: command)
+    monkeypatch.setattr(cli, "hold_one_thread", lambda: None)
     assert cli.run(["four"]) == 4
 
 
 def _threads_seen(**environment: str) -> str:
-    clean = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    clean = {k: v for k, v in os.environ.items() if k not in THREAD_VARIABLES}
     code = (
         "from etc_engine.cli.threads import hold_one_thread\nhold_one_thread()\n"
         "import numpy, threadpoolctl\n"

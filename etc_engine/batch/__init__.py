@@ -1,0 +1,1 @@
+"""Sweeps of random realizations: study file, plan, scheduler, shards, statistics, dataset."""

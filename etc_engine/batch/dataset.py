@@ -1,0 +1,301 @@
+"""The dataset of a sweep: records in, one xarray dataset out, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.batch.plan import Unit, stream_fingerprint
+from etc_engine.batch.records import Record
+from etc_engine.batch.shards import sync_folder
+from etc_engine.batch.statistics import summarize
+from etc_engine.batch.study import Study
+from etc_engine.errors import OutputError
+from etc_engine.realization import Status
+
+if TYPE_CHECKING:
+    import xarray
+
+Values = dict[str, NDArray[Any]]
+CELL = ("density", "contact_angle", "method", "realization")
+UNIT = ("density", "realization")
+TENSOR = ("direction_i", "direction_j")
+INCIDENTAL = ("_seconds", "_rank", "_host", "_time")
+"""Endings of the names of variables that differ from run to run."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """How a quantity is stored: numpy type, what stands in cells that were not run, and its meaning."""
+
+    dtype: Any
+    empty: Any
+    long_name: str
+    units: str = "1"
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of the stored variable."""
+        return {"long_name": self.long_name, "units": self.units}
+
+
+CELL_VARIABLES = {
+    "contacts": Variable(np.int64, -1, "number of contacts between particles, before pruning"),
+    "wall_contacts": Variable(np.int64, -1, "number of contacts with walls, before pruning"),
+    "coordination": Variable(np.float64, np.nan, "mean coordination number, before pruning"),
+    "unknowns": Variable(np.int64, -1, "number of unknowns of the linear system, after pruning"),
+    "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
+    "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
+    "solve_seconds": Variable(np.float64, np.nan, "time to solve", "s"),
+}
+UNIT_VARIABLES = {
+    "particles": Variable(np.int64, -1, "number of particles, before pruning"),
+    "packing_density": Variable(np.float64, np.nan, "sum of full particle areas over the area of the box"),
+    "solid_fraction": Variable(np.float64, np.nan, "area of the union of the particles over the area of the box"),
+    "pack_seconds": Variable(np.float64, np.nan, "time to pack", "s"),
+    "random_stream": Variable(np.uint64, 0, "first 64 bits of the random stream"),
+    "worker_rank": Variable(np.int64, -1, "rank that computed the realization"),
+    "worker_host": Variable(object, "", "host that computed the realization"),
+    "start_time": Variable(np.float64, np.nan, "start of the realization", "seconds since 1970-01-01"),
+    "end_time": Variable(np.float64, np.nan, "end of the realization", "seconds since 1970-01-01"),
+}
+STATISTICS = {
+    "mean": "mean of the conductivity over realizations",
+    "std": "standard deviation of the conductivity over realizations",
+    "sem": "standard error of the mean conductivity",
+    "ci_low": "lower end of the confidence interval of the mean conductivity",
+    "ci_high": "upper end of the confidence interval of the mean conductivity",
+}
+STREAM_COMMENT = (
+    "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
+    "of the density as a double (NaN: the packer's own); stored is generate_state(1, uint64) of the sequence"
+)
+ANGLE_COMMENT = "half of the angle that the contact arc subtends at the centre of a disk; not a wetting angle"
+
+
+def assemble(study: Study, records: Mapping[Unit, Record], attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """The dataset of a study from the records of its units.
+
+    Parameters
+    ----------
+    study : Study
+        The study; it gives the dimensions.
+    records : mapping of Unit to Record
+        What was run; cells without a record are ``not_run``.
+    attributes : mapping
+        Global attributes, see :mod:`etc_engine.batch.provenance`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``density``, ``contact_angle`` (only where angles are prescribed), ``method`` (only where
+        the study lists methods), ``realization``, ``direction_i``, ``direction_j``.
+    """
+    import xarray
+
+    wanted = {Unit(d, r) for d in study.densities for r in range(study.statistics.cap)}
+    records = {unit: record for unit, record in records.items() if unit in wanted}
+    cells, units = _cell_values(study, records), _unit_values(study, records)
+    dataset = xarray.Dataset(attrs=dict(attributes))
+    dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
+    dataset["conductivity"] = (CELL + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
+    for name, variable in CELL_VARIABLES.items():
+        dataset[name] = (CELL, cells[name], variable.attributes)
+    dataset["status"] = (CELL, cells["status"], _status_attributes())
+    dataset["message"] = (CELL, cells["message"], {"long_name": "what went wrong, in words"})
+    for name, variable in UNIT_VARIABLES.items():
+        dataset[name] = (UNIT, units[name], variable.attributes)
+    dataset["random_stream"].attrs["comment"] = STREAM_COMMENT
+    _add_statistics(dataset, cells, study.statistics.confidence)
+    if study.contacts.contact_angle is None:
+        dataset = dataset.isel(contact_angle=0, drop=True)
+    if isinstance(study.conduction.method, str):
+        dataset = dataset.isel(method=0, drop=True)
+    return dataset
+
+
+def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str, Any]:
+    axes = list("xyz"[: study.box.dimension])
+    density, comment = study.packing.density, "sum of the full particle areas over the area of the box"
+    if density is None:
+        reached = packing_density[np.isfinite(packing_density)]
+        density = (float(reached.mean()) if reached.size else np.nan,)
+        comment += "; the packer's own, mean over realizations"
+    degrees = {"long_name": "contact half-angle", "units": "degree", "comment": ANGLE_COMMENT}
+    return {
+        "density": ("density", np.array(density), {"long_name": "density", "units": "1", "comment": comment}),
+        "contact_angle": ("contact_angle", np.array(study.contacts.contact_angle or (np.nan,)), degrees),
+        "method": ("method", np.array(study.conduction.methods, dtype=object), {"long_name": "method"}),
+        "realization": (
+            "realization",
+            np.arange(study.statistics.cap),
+            {"long_name": "realization", "units": "1"},
+        ),
+        "direction_i": ("direction_i", np.array(axes, dtype=object), {"long_name": "direction of the flux"}),
+        "direction_j": (
+            "direction_j",
+            np.array(axes, dtype=object),
+            {"long_name": "direction of the gradient"},
+        ),
+    }
+
+
+def _cell_values(study: Study, records: Mapping[Unit, Record]) -> Values:
+    """Arrays over (density, contact_angle, method, realization)."""
+    d = study.box.dimension
+    shape = (
+        len(study.densities),
+        len(study.contacts.contact_angle or (None,)),
+        len(study.conduction.methods),
+        study.statistics.cap,
+    )
+    values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in CELL_VARIABLES.items()}
+    values["conductivity"] = np.full((*shape, d, d), np.nan)
+    values["status"] = np.full(shape, Status.NOT_RUN, np.int8)
+    values["message"] = np.full(shape, "", object)
+    for unit, record in records.items():
+        i = study.densities.index(unit.density)
+        for a, row in enumerate(record.result.cells):
+            for m, cell in enumerate(row):
+                place = (i, a, m, unit.realization)
+                values["status"][place], values["message"][place] = int(cell.status), cell.message
+                for name in CELL_VARIABLES:
+                    values[name][place] = getattr(cell, name)
+                if cell.status <= Status.NOT_PERCOLATING:
+                    values["conductivity"][place] = cell.conductivity
+    return values
+
+
+def _unit_values(study: Study, records: Mapping[Unit, Record]) -> Values:
+    """Arrays over (density, realization)."""
+    shape = (len(study.densities), study.statistics.cap)
+    values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in UNIT_VARIABLES.items()}
+    for unit, record in records.items():
+        place = (study.densities.index(unit.density), unit.realization)
+        stored = {
+            "particles": record.result.particles,
+            "packing_density": record.result.density,
+            "solid_fraction": record.result.solid_fraction,
+            "pack_seconds": record.result.pack_seconds,
+            "random_stream": stream_fingerprint(study.seed, unit),
+            "worker_rank": record.rank,
+            "worker_host": record.host,
+            "start_time": record.start_time,
+            "end_time": record.end_time,
+        }
+        for name, value in stored.items():
+            values[name][place] = value
+    return values
+
+
+def _add_statistics(dataset: xarray.Dataset, cells: Values, confidence: float) -> None:
+    """Statistics over the realizations that have a conductivity, 0 of a non-percolating one included."""
+    valid = cells["status"] <= Status.NOT_PERCOLATING
+    shape, tensor = valid.shape[:-1], cells["conductivity"].shape[-2:]
+    count = np.zeros(shape, np.int64)
+    values = {name: np.full(shape + tensor, np.nan) for name in STATISTICS}
+    for place in np.ndindex(*shape):
+        summary = summarize(cells["conductivity"][place][valid[place]], confidence)
+        count[place] = summary.count
+        for name in STATISTICS:
+            values[name][place] = getattr(summary, name)
+    for name, long_name in STATISTICS.items():
+        attributes = _conductivity_attributes(long_name)
+        if name.startswith("ci"):
+            attributes |= {
+                "confidence_level": confidence,
+                "comment": "Student t with count - 1 degrees of freedom",
+            }
+        dataset[f"conductivity_{name}"] = (CELL[:-1] + TENSOR, values[name], attributes)
+    dataset["count"] = (
+        CELL[:-1],
+        count,
+        {"long_name": "realizations that enter the statistics: ok and not_percolating", "units": "1"},
+    )
+
+
+def _conductivity_attributes(long_name: str) -> dict[str, Any]:
+    return {
+        "long_name": long_name.replace("conductivity", "effective thermal conductivity"),
+        "units": "W m-1 K-1",
+    }
+
+
+def _status_attributes() -> dict[str, Any]:
+    return {
+        "long_name": "how the realization ended",
+        "flag_values": np.array([int(status) for status in Status], dtype=np.int8),
+        "flag_meanings": " ".join(status.name.lower() for status in Status),
+    }
+
+
+def write_dataset(dataset: xarray.Dataset, output: Path) -> None:
+    """Write a dataset as netCDF-4: temporary file, sync, rename.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written; nothing is left behind then.
+    """
+    temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
+    try:
+        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
+        with temporary.open("rb") as stream:
+            os.fsync(stream.fileno())
+        temporary.replace(output)
+        sync_folder(output.parent)
+    except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as RuntimeError
+        temporary.unlink(missing_ok=True)
+        raise OutputError(f"cannot write {output}: {error}; the finished units are safe in its shards") from None
+
+
+def differing_variables(one: xarray.Dataset, other: xarray.Dataset) -> list[str]:
+    """Names of the variables in which two datasets do not have the same bits.
+
+    Variables that say where and when something was computed (``_seconds``, ``_rank``, ``_host``, ``_time``)
+    and attributes are left out.
+    """
+    names = sorted({str(name) for name in (*one.variables, *other.variables)})
+    return [name for name in names if not name.endswith(INCIDENTAL) and not _same_bits(one, other, name)]
+
+
+def _same_bits(one: xarray.Dataset, other: xarray.Dataset, name: str) -> bool:
+    if name not in one.variables or name not in other.variables:
+        return False
+    a, b = one[name].values, other[name].values
+    if a.shape != b.shape or a.dtype.kind != b.dtype.kind:
+        return False
+    if a.dtype.kind in "OU":
+        return bool((a == b).all())
+    return a.dtype == b.dtype and a.tobytes() == b.tobytes()
+
+
+def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
+    """NaN is what a missing number is; integers have none, and no attribute should say so."""
+    return {str(name): {"_FillValue": None} for name, values in dataset.variables.items() if values.dtype.kind != "O"}
+
+
+def open_dataset(path: Path) -> xarray.Dataset:
+    """The dataset in a file, loaded and closed.
+
+    Raises
+    ------
+    OutputError
+        If the file is missing or is not the result of a sweep.
+    """
+    import xarray
+
+    try:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
+            dataset = stored.load()
+    except OSError as error:
+        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
+    if "study_digest" not in dataset.attrs:
+        raise OutputError(f"{path} is not the result of a sweep: it has no attribute study_digest")
+    return dataset

@@ -1,0 +1,196 @@
+"""The lock of an output file: one run at a time, and a dead run does not block the next.
+
+The lock is a small file with the holder's host, process and batch job, touched every few seconds. It is
+stale when its process is gone (same host), when its batch job was requeued and this is the requeued job,
+or when it has not been touched for `SILENCE` seconds (another host). Times are compared on the clock of
+the file system, so clocks of hosts may differ.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+
+from etc_engine.errors import OutputError
+
+BEAT = 10.0
+SILENCE = 120.0
+
+
+@dataclass(frozen=True)
+class Holder:
+    """Who holds a lock."""
+
+    run: str
+    host: str
+    boot: str
+    process: int
+    process_start: str
+    job: str = ""
+    restarts: int = 0
+
+    @classmethod
+    def this_process(cls, run: str, environment: Mapping[str, str] = os.environ) -> Holder:
+        """The running process, with the batch job it belongs to."""
+        slurm, pbs = environment.get("SLURM_JOB_ID"), environment.get("PBS_JOBID")
+        return cls(
+            run=run,
+            host=socket.gethostname(),
+            boot=_boot(),
+            process=os.getpid(),
+            process_start=_process_start(os.getpid()),
+            job=f"slurm {slurm}" if slurm else f"pbs {pbs}" if pbs else "",
+            restarts=int(environment.get("SLURM_RESTART_COUNT", "0")),
+        )
+
+
+class Lock:
+    """The lock in a folder, held from ``with`` to the end of its block.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder to lock; it exists.
+    run : str
+        The identity of this run.
+
+    Raises
+    ------
+    OutputError
+        If a living process holds the lock; the message says which, and what to do.
+    """
+
+    def __init__(self, folder: Path, run: str) -> None:
+        self.path = folder / "lock"
+        self.holder = Holder.this_process(run)
+        self._ended = threading.Event()
+        self._heart = threading.Thread(target=self._beat, name="lock", daemon=True)
+
+    def __enter__(self) -> Lock:
+        while not self._create():
+            found = read_holder(self.path)
+            reason = alive(self.path, found, self.holder)
+            if reason:
+                raise OutputError(f"another run is computing this output ({reason}): wait for it, or end it first")
+            self._move_away(found)
+        self._heart.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        if self._heart.is_alive():
+            self._heart.join()
+        if held_by(self.path, self.holder.run):
+            self.path.unlink(missing_ok=True)
+
+    def _create(self) -> bool:
+        """Put the lock in place with its content, unless there is one: a link is atomic, also on NFS."""
+        draft = self.path.with_name(f".lock.{self.holder.run}.tmp")
+        try:
+            draft.write_text(json.dumps(asdict(self.holder)))
+            os.link(draft, self.path)
+        except FileExistsError:
+            return False
+        except OSError as error:
+            raise OutputError(f"cannot write lock {self.path}: {error.strerror}") from None
+        finally:
+            draft.unlink(missing_ok=True)
+        return True
+
+    def _move_away(self, stale: Holder | None) -> None:
+        """Remove a stale lock; if another run replaced it in between, put that one back."""
+        aside = self.path.with_name(f".lock.{self.holder.run}.stale")
+        try:
+            self.path.rename(aside)
+        except FileNotFoundError:
+            return
+        if read_holder(aside) != stale and not self.path.exists():
+            os.link(aside, self.path)
+        aside.unlink()
+
+    def _beat(self) -> None:
+        while not self._ended.wait(BEAT):
+            try:
+                os.utime(self.path)
+            except OSError:
+                return  # taken over or removed: the next check of held_by tells
+
+
+def held_by(path: Path, run: str) -> bool:
+    """True while a run holds a lock."""
+    holder = read_holder(path)
+    return holder is not None and holder.run == run
+
+
+def read_holder(path: Path) -> Holder | None:
+    """Who holds a lock; None if there is no lock, or none that can be read."""
+    try:
+        return Holder(**json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def alive(path: Path, holder: Holder | None, me: Holder) -> str:
+    """Why the holder of a lock counts as alive, in words; empty if the lock is stale."""
+    silent = _seconds_since_touched(path)
+    if silent is None:
+        return ""
+    if holder is None:
+        return "" if silent > SILENCE else f"its lock {path} cannot be read"
+    who = f"process {holder.process} on {holder.host}"
+    if holder.job and holder.job == me.job and holder.restarts < me.restarts:
+        return ""
+    if holder.host == me.host:
+        same = holder.boot == me.boot and _process_start(holder.process) == holder.process_start
+        return f"{who} is running" if same and holder.process_start else ""
+    if silent > SILENCE:
+        return ""
+    return f"{who} gave a sign of life {silent:.0f} s ago; after {SILENCE:.0f} s without one it counts as dead"
+
+
+def _seconds_since_touched(path: Path) -> float | None:
+    """Age of a lock on the clock of its file system; None if it is gone."""
+    probe = path.with_name(f".clock.{os.getpid()}.{time.monotonic_ns()}.tmp")
+    try:
+        probe.touch()
+        now = probe.stat().st_mtime
+        return now - path.stat().st_mtime
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise OutputError(f"cannot write beside lock {path}: {error.strerror}") from None
+    finally:
+        probe.unlink(missing_ok=True)
+
+
+def _boot() -> str:
+    """Identity of this boot of the machine, where the system tells it."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    except OSError:
+        return ""
+
+
+def _process_start(process: int) -> str:
+    """When a process started, in the system's own ticks; empty if there is no such process."""
+    try:
+        status = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        return "" if status[0] == "Z" else status[19]
+    except OSError:
+        pass
+    if Path("/proc/self/stat").exists():
+        return ""
+    try:  # a system without /proc: a number in use is all there is to see
+        os.kill(process, 0)
+    except OSError:
+        return ""
+    return "running"

@@ -1,0 +1,55 @@
+"""Stopping early: a warning signal ends the unit at hand, what is finished stays."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from types import FrameType, TracebackType
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
+
+
+class Stopped(BaseException):
+    """Raised inside a unit by a signal. Not an ``Exception``: a unit records those as its result."""
+
+
+class StopRequest:
+    """Listens to SIGTERM and SIGINT within its ``with`` block; the first one asks to stop.
+
+    Schedulers send SIGTERM some seconds before they kill. A unit can take longer than that, so it is cut
+    short; between units, and while other ranks are waited for, the request is only noted.
+    """
+
+    def __init__(self) -> None:
+        self.reason = ""
+        self._in_unit = False
+        self._before: dict[int, Any] = {}
+
+    def run(self, unit: Callable[[], T]) -> T:
+        """Run a unit; `Stopped` leaves it when a signal comes or has come."""
+        try:
+            self._in_unit = True
+            if self.reason:
+                raise Stopped
+            return unit()
+        finally:
+            self._in_unit = False
+
+    def _note(self, number: int, _frame: FrameType | None) -> None:
+        first, self.reason = not self.reason, self.reason or signal.Signals(number).name
+        if first and self._in_unit:
+            raise Stopped
+
+    def __enter__(self) -> StopRequest:
+        if threading.current_thread() is threading.main_thread():
+            self._before = {number: signal.signal(number, self._note) for number in SIGNALS}
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,287 @@
+"""A sweep from end to end: claim the output, run the units in rounds, write the dataset.
+
+Rank 0 decides (what to run, whether to go on) and every rank computes. Decisions read the shards alone,
+so that a sweep in one go and a sweep in pieces take the same ones.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar, cast
+
+from etc_engine.batch import provenance
+from etc_engine.batch.claim import Claim, Policy, claim_output, recorded_runs
+from etc_engine.batch.dataset import assemble, open_dataset, write_dataset
+from etc_engine.batch.lock import held_by
+from etc_engine.batch.plan import Unit, next_targets, unit_rng, units_to_run
+from etc_engine.batch.records import Record, failed_realization
+from etc_engine.batch.scheduler import STOP, Communicator
+from etc_engine.batch.shards import ShardReader, ShardWriter, remove_folder
+from etc_engine.batch.stop import Stopped, StopRequest
+from etc_engine.batch.study import Study
+from etc_engine.errors import EtcError, OutputError
+from etc_engine.realization import Realization, RealizationSpec, Status
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray
+
+T = TypeVar("T")
+Realize = Callable[[RealizationSpec, "np.random.Generator"], Realization]
+Report = Callable[[int, int, int], None]
+"""Called on rank 0 with units done, units planned and cells failed."""
+
+Notify = Callable[[str], None]
+"""Called on rank 0 with a remark."""
+
+NEXT, DONE, FAILED = 0, 1, 2
+LOCK_CHECK_SECONDS = 5.0
+VISIBLE_SECONDS = 60.0
+"""How long a network file system may take to show rank 0 what other ranks have written."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a sweep ended. ``cells`` counts the statuses; ``stopped`` is the reason of an early end."""
+
+    output: Path
+    units: int
+    computed: int
+    cells: Mapping[Status, int] = field(default_factory=dict)
+    stopped: str = ""
+
+    @property
+    def failed(self) -> int:
+        """Cells that should have a conductivity and have none."""
+        return sum(n for status, n in self.cells.items() if Status.NOT_PERCOLATING < status < Status.NOT_RUN)
+
+
+def _silent(*_: object) -> None:
+    """Tell nobody."""
+
+
+def sweep(
+    study_path: Path,
+    output: Path,
+    policy: Policy,
+    communicator: Communicator,
+    realize: Realize,
+    *,
+    report: Report = _silent,
+    notify: Notify = _silent,
+) -> Outcome:
+    """Run a study on all ranks of a communicator and write its dataset.
+
+    Parameters
+    ----------
+    study_path, output : Path
+        The study file and the netCDF file to write.
+    policy : {"fresh", "resume", "overwrite"}
+        What to do where there is an output, or shards of one.
+    communicator : Communicator
+        See :func:`etc_engine.batch.scheduler.connect`; every rank calls this function.
+    realize : callable
+        (spec, rng) -> Realization, :func:`etc_engine.realization.realize` or a stand-in.
+    report, notify : callable
+        Progress and remarks, called on rank 0 only.
+
+    Returns
+    -------
+    Outcome
+        The same on every rank.
+
+    Raises
+    ------
+    StudyError
+        If the study is not valid, or is another than the one to resume.
+    OutputError
+        If the output exists, is locked or cannot be written. Every rank raises the same error.
+    """
+    with StopRequest() as stop, ExitStack() as held:
+        claim = on_rank_zero(communicator, partial(claim_output, study_path, output, policy, communicator.size, held))
+        if claim.complete:
+            return on_rank_zero(communicator, partial(_outcome_of_file, claim))
+        reader, computed = ShardReader(claim.folder), 0
+        targets = dict.fromkeys(claim.study.densities, claim.study.statistics.realizations)
+        for number in count():
+            plan = on_rank_zero(communicator, partial(_plan_round, claim, reader, targets, computed))
+            if number == 0 and communicator.rank == 0:
+                _notify_start(claim, plan, reader, notify)
+            if not plan.units:
+                break
+            base = computed + number * communicator.size
+            round_ = _Round(claim, plan, base, f"{claim.run}-{number}", report)
+            stopped = _run_round(round_, communicator, realize, stop)
+            if stopped:
+                return Outcome(output, plan.planned, communicator.add(DONE, 0), stopped=stopped)
+            on_rank_zero(communicator, partial(_await_units, reader, plan.units))
+            targets, computed = plan.targets, computed + len(plan.units)
+        return on_rank_zero(communicator, partial(_finish, claim, reader, computed))
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What a round computes, and where it stands in the whole: ``known`` units were there before this run."""
+
+    targets: dict[float | None, int]
+    units: list[Unit]
+    known: int
+    planned: int
+
+
+@dataclass(frozen=True)
+class _Round:
+    """Units between two decisions; ``base`` is where the shared counter stood when they began."""
+
+    claim: Claim
+    plan: _Plan
+    base: int
+    shard: str
+    report: Report
+
+    def tell(self, communicator: Communicator) -> None:
+        """Report the progress, from rank 0."""
+        if communicator.rank == 0:
+            done = self.plan.known + communicator.add(DONE, 0)
+            self.report(done, self.plan.planned, communicator.add(FAILED, 0))
+
+
+def _plan_round(claim: Claim, reader: ShardReader, targets: dict[float | None, int], computed: int) -> _Plan:
+    """The next round that has something to compute, or an empty one when every cell is settled.
+
+    Rounds that the shards hold already are decided again from the same records, as if they ran now.
+    """
+    records = reader.read()
+    units = units_to_run(targets, records)
+    while not units:
+        grown = next_targets(claim.study, targets, records)
+        if grown == targets:
+            break
+        targets = grown
+        units = units_to_run(targets, records)
+    planned = sum(targets.values())
+    return _Plan(targets, units, planned - len(units) - computed, planned)
+
+
+def _run_round(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
+    """Compute the units of a round on all ranks; answers the reason if any of them stopped early."""
+    reason = _compute(round_, communicator, realize, stop)
+    communicator.wait_for_all(lambda: round_.tell(communicator))
+    reasons = communicator.gather(reason)
+    return str(communicator.broadcast(next(filter(None, reasons), "") if reasons else ""))
+
+
+def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
+    """Take units until there are none; answers why this rank stopped early, or nothing.
+
+    Every rank takes one number beyond the last unit: the next round's base allows for it.
+    """
+    claim, units, checked = round_.claim, round_.plan.units, time.monotonic()
+    specs = {density: claim.study.realization_spec(density) for density in claim.study.densities}
+    try:
+        with ShardWriter(claim.folder, round_.shard, communicator.rank) as shard:
+            while (index := communicator.add(NEXT, 1) - round_.base) < len(units):
+                work = partial(_run_unit, claim.study, specs, units[index], communicator.rank, realize)
+                record = stop.run(work)
+                if time.monotonic() - checked > LOCK_CHECK_SECONDS:
+                    checked = time.monotonic()
+                    if not held_by(claim.folder / "lock", claim.run):
+                        raise OutputError(f"the lock of {claim.output} was taken over by another run")
+                shard.append(record)
+                communicator.add(DONE, 1)
+                communicator.add(FAILED, record.failed)
+                round_.tell(communicator)
+    except Stopped:
+        communicator.add(NEXT, STOP)
+    except OutputError as error:
+        communicator.add(NEXT, STOP)
+        return str(error)
+    return stop.reason
+
+
+def _run_unit(
+    study: Study,
+    specs: Mapping[float | None, RealizationSpec],
+    unit: Unit,
+    rank: int,
+    realize: Realize,
+) -> Record:
+    """One realization; what it raises becomes its result."""
+    spec, started = specs[unit.density], time.time()
+    try:
+        result = realize(spec, unit_rng(study.seed, unit))
+    except Exception as error:
+        angles, methods = len(spec.contacts.contact_angles) or 1, len(spec.conduction.methods)
+        result = failed_realization(error, angles, methods, study.box.dimension)
+    return Record(unit, result, rank, socket.gethostname(), started, time.time())
+
+
+def _await_units(reader: ShardReader, units: Sequence[Unit]) -> None:
+    """Wait until a network file system shows rank 0 what the other ranks have synced."""
+    deadline = time.monotonic() + VISIBLE_SECONDS
+    while missing := [unit for unit in units if unit not in reader.read()]:
+        if time.monotonic() > deadline:
+            raise OutputError(
+                f"{len(missing)} finished units do not appear in {reader.folder}, the first is {missing[0]}: "
+                "do all ranks see the same folder? go on with --resume"
+            )
+        time.sleep(0.2)
+
+
+def _finish(claim: Claim, reader: ShardReader, computed: int) -> Outcome:
+    """Assemble the dataset, put it in place, take the shards away."""
+    records = reader.read()
+    hosts = [record.host for record in records.values()]
+    attributes = provenance.attributes(claim.study, claim.text, recorded_runs(claim.folder), hosts)
+    dataset = assemble(claim.study, records, attributes)
+    outcome = Outcome(claim.output, len(records), computed, _count_cells(dataset))
+    try:
+        write_dataset(dataset, claim.output)
+    except OutputError as error:
+        return replace(outcome, stopped=str(error))
+    remove_folder(claim.folder)
+    return outcome
+
+
+def _outcome_of_file(claim: Claim) -> Outcome:
+    """The outcome of a sweep that had finished before."""
+    dataset = open_dataset(claim.output)
+    units = int((dataset["worker_rank"] >= 0).sum())
+    return Outcome(claim.output, units, 0, _count_cells(dataset))
+
+
+def _count_cells(dataset: xarray.Dataset) -> dict[Status, int]:
+    found = Counter(dataset["status"].values.ravel().tolist())
+    return {status: found[int(status)] for status in Status if found[int(status)]}
+
+
+def _notify_start(claim: Claim, plan: _Plan, reader: ShardReader, notify: Notify) -> None:
+    """Say what was found before the first round."""
+    for remark in claim.remarks:
+        notify(remark)
+    if reader.damaged:
+        notify(f"{reader.damaged} damaged lines in the shards are left out, their units run again")
+    if plan.known:
+        notify(f"{plan.known} of {plan.planned} units are finished already")
+
+
+def on_rank_zero(communicator: Communicator, action: Callable[[], T]) -> T:
+    """What an action answers on rank 0, on every rank; an EtcError there is raised on every rank."""
+    answer: tuple[T | None, EtcError | None] = (None, None)
+    if communicator.rank == 0:
+        try:
+            answer = (action(), None)
+        except EtcError as error:
+            answer = (None, error)
+    answer = communicator.broadcast(answer)
+    if answer[1] is not None:
+        raise answer[1]
+    return cast(T, answer[0])

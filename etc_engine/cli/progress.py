@@ -1,0 +1,67 @@
+"""The progress of a sweep: a bar on a terminal, a line a minute elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Any
+
+import click
+
+LINE_SECONDS = 60.0
+
+
+class Progress:
+    """Shows units done of units planned, rate, remaining time and failures on stderr."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+        self._started = self._told = time.monotonic()
+        self._first: int | None = None
+
+    def report(self, done: int, planned: int, failed: int) -> None:
+        """Take in the present state; shows it if it is time."""
+        if self._first is None:
+            self._first = done
+        if sys.stderr.isatty():
+            self._show_bar(done, planned, failed)
+        elif time.monotonic() - self._told >= LINE_SECONDS:
+            self._told = time.monotonic()
+            click.echo(progress_line(done, planned, failed, done - self._first, self._told - self._started), err=True)
+
+    def notify(self, text: str) -> None:
+        """A remark of its own line."""
+        click.echo(f"etc-engine: {text}", err=True)
+
+    def _show_bar(self, done: int, planned: int, failed: int) -> None:
+        if self._bar is None:
+            import tqdm
+
+            self._bar = tqdm.tqdm(total=planned, initial=done, unit="unit", dynamic_ncols=True, file=sys.stderr)
+        self._bar.total = planned
+        if failed:
+            self._bar.set_postfix_str(f"{failed} failed", refresh=False)
+        self._bar.update(done - self._bar.n)
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def progress_line(done: int, planned: int, failed: int, computed: int, seconds: float) -> str:
+    """One line for a log.
+
+    Examples
+    --------
+    >>> progress_line(30, 120, 1, 20, 40.0)
+    'etc-engine: 30/120 units, 0.5 units/s, 180 s to go, 1 cells failed'
+    """
+    rate = computed / seconds if seconds > 0.0 else 0.0
+    left = f"{(planned - done) / rate:.0f} s to go" if rate else "no estimate yet"
+    return f"etc-engine: {done}/{planned} units, {rate:.3g} units/s, {left}, {failed} cells failed"

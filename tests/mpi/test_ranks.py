@@ -1,0 +1,153 @@
+"""The same bits for any number of ranks; no rank hangs when another fails."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from etc_engine.batch.dataset import differing_variables, open_dataset
+
+STAND_IN = Path(__file__).parent.parent / "stand_in.py"
+MPIEXEC = Path(sys.executable).with_name("mpiexec")
+needs_mpi = pytest.mark.skipif(not MPIEXEC.exists(), reason="no mpiexec beside python: install the extra 'mpi'")
+
+STUDY = """
+schema = 1
+name = "ranks"
+seed = 20261
+[packing]
+radii = "uniform:0.01:0.02"
+box = [1.0, 1.0]
+density = [0.7, 0.6, 0.65, 0.75]
+[contacts]
+rule = "bonded"
+contact_angle = [2.5, 5.0]
+[conduction]
+method = ["chord", "arc"]
+[statistics]
+realizations = 6
+"""
+
+
+def ranks(count: int, *command: str, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+    launcher = [str(MPIEXEC), "-n", str(count)] if count else []
+    return subprocess.run(
+        [*launcher, sys.executable, *command], capture_output=True, text=True, check=False, timeout=timeout
+    )
+
+
+def stand_in(count: int, *arguments: object, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+    return ranks(count, str(STAND_IN), *map(str, arguments), timeout=timeout)
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    return path
+
+
+@needs_mpi
+@pytest.mark.parametrize("trouble", [(), ("--trouble",)], ids=["calm", "trouble"])
+def test_the_same_bits_for_any_number_of_ranks(study, tmp_path, trouble):
+    results = {}
+    for count in (0, 1, 2, 4):
+        output = tmp_path / f"out{count}.nc"
+        done = stand_in(count, study, "-o", output, "--seconds", 0.02, *trouble)
+        assert done.returncode == (4 if trouble else 0), done.stderr
+        assert not output.with_name(output.name + ".shards").exists()
+        results[count] = open_dataset(output)
+    for count in (1, 2, 4):
+        assert differing_variables(results[0], results[count]) == []
+    assert set(results[4]["worker_rank"].values.ravel()) == {0, 1, 2, 3}
+
+
+@needs_mpi
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_adaptive_rounds_are_the_same_for_any_number_of_ranks(study, tmp_path, count):
+    study.write_text(STUDY + "relative_ci = 0.02\nmax_realizations = 60\n")
+    serial, parallel = tmp_path / "serial.nc", tmp_path / "parallel.nc"
+    assert stand_in(0, study, "-o", serial).returncode == 0
+    assert stand_in(count, study, "-o", parallel).returncode == 0
+    one, many = open_dataset(serial), open_dataset(parallel)
+    assert differing_variables(one, many) == []
+    assert one.sizes["realization"] == 60
+    assert 6 < one["count"].max() <= 60
+
+
+@needs_mpi
+def test_a_wrong_study_is_one_line_and_status_2_on_two_ranks(study, tmp_path):
+    study.write_text(STUDY.replace("realizations", "realisations"))
+    done = stand_in(2, study, "-o", tmp_path / "out.nc")
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if line.startswith("etc-engine")]
+    assert len(lines) == 1
+    assert "did you mean 'realizations'" in lines[0]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["study.toml"]
+
+
+@needs_mpi
+@pytest.mark.parametrize("guilty", [0, 1])
+def test_an_error_of_the_program_on_one_rank_ends_all(study, tmp_path, guilty):
+    """What no unit catches: without MPI_Abort the other rank would wait for ever."""
+    code = (
+        "import sys, pathlib\nimport etc_engine.batch.sweep as s\nfrom etc_engine.cli.sweep import launch\n"
+        f"exec(open({str(STAND_IN)!r}).read().split('def main')[0])\n"
+        "run = s._run_unit\n"
+        "def broken(study, specs, unit, rank, realize):\n"
+        f"    if rank == {guilty}: raise MemoryError('no room')\n"
+        "    wait(0.2, False)\n    return run(study, specs, unit, rank, realize)\n"
+        "s._run_unit = broken\n"
+        "launch(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), 'fresh', realize)\n"
+    )
+    done = ranks(2, "-c", code, str(study), str(tmp_path / "out.nc"), timeout=60)
+    assert done.returncode == 1, done.stderr
+    assert f"unexpected MemoryError on rank {guilty}: no room" in done.stderr
+    assert not (tmp_path / "out.nc").exists()
+    resumed = stand_in(0, study, "-o", tmp_path / "out.nc", "--policy", "resume")
+    assert resumed.returncode == 0, resumed.stderr
+
+
+@needs_mpi
+def test_the_counter_gives_each_number_once():
+    code = (
+        "import sys\nfrom etc_engine.batch.scheduler import connect\nc = connect()\n"
+        "mine = [c.add(0, 1) for _ in range(500)]\n"
+        "everyone = c.gather(mine)\nc.wait_for_all(lambda: None)\nc.close()\n"
+        "if c.rank == 0:\n"
+        "    assert sorted(sum(everyone, [])) == list(range(1500))\n"
+        "    assert all(m == sorted(m) for m in everyone)\n    print('each once')\n"
+    )
+    done = ranks(3, "-c", code)
+    assert done.stdout.strip() == "each once", done.stderr
+
+
+@needs_mpi
+def test_ranks_without_an_mpi_library_are_refused_not_multiplied(study, tmp_path):
+    """mpi4py raises RuntimeError where it finds no library: each rank would run the whole sweep alone."""
+    done = subprocess.run(
+        [str(MPIEXEC), "-n", "2", sys.executable, str(STAND_IN), str(study), "-o", str(tmp_path / "out.nc")],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "MPI4PY_LIBMPI": str(tmp_path / "none.so")},
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert "2 processes, but mpi4py finds no MPI library" in done.stderr
+    assert not (tmp_path / "out.nc").exists()
+
+
+def test_one_process_needs_no_mpi_at_all(study, tmp_path):
+    code = (
+        "import sys\nsys.modules['mpi4py'] = None\n"
+        f"sys.argv = ['stand_in', {str(study)!r}, '-o', {str(tmp_path / 'out.nc')!r}]\n"
+        f"import runpy; runpy.run_path({str(STAND_IN)!r}, run_name='__main__')"
+    )
+    done = ranks(0, "-c", code)
+    assert done.returncode == 0, done.stderr
+    assert open_dataset(tmp_path / "out.nc").sizes["realization"] == 6

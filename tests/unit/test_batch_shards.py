@@ -1,0 +1,143 @@
+"""Records and shards: every bit comes back, damage is recognised, a full disk loses nothing."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from etc_engine.batch.plan import Unit
+from etc_engine.batch.records import Record, decode, encode, failed_realization
+from etc_engine.batch.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
+from etc_engine.errors import OutputError
+from etc_engine.realization import Cell, Realization, Status
+
+
+def record(realization: int, value: float = 0.3, message: str = "") -> Record:
+    cell = Cell(Status.OK, message, np.array([[value, np.nan], [np.nan, -value]]), 5, 2, 3.3, 7, 9, 1e-12, 0.5)
+    result = Realization(11, 0.7, 0.69, 0.25, ((cell, cell), (cell, cell)))
+    return Record(Unit(0.7, realization), result, 3, "node", 1.5, 2.5)
+
+
+def bits(found: Record) -> bytes:
+    cells = [cell for row in found.result.cells for cell in row]
+    return b"".join(cell.conductivity.tobytes() for cell in cells)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(allow_nan=False), st.text(max_size=30))
+def test_a_record_keeps_every_bit(value, message):
+    there = record(4, value, message)
+    line = encode(there)
+    assert "\n" not in line
+    back = decode(line)
+    assert bits(back) == bits(there)
+    assert encode(back) == line
+    assert back.result.cells[1][0].message == message
+
+
+def test_numpy_numbers_of_an_engine_become_plain():
+    cell = Cell(Status.OK, conductivity=np.eye(2), contacts=np.int64(3), coordination=np.float64(1.5))
+    there = Record(Unit(None, 0), Realization(np.int64(2), 0.5, 0.5, 0.0, ((cell,),)), 0, "node", 0.0, 0.0)
+    back = decode(encode(there))
+    assert back.unit == Unit(None, 0)
+    assert back.result.cells[0][0].contacts == 3
+
+
+def test_an_exception_becomes_a_steady_one_line_message():
+    result = failed_realization(ValueError(f"bad\nthing {object()!r}"), 2, 3, 2)
+    assert len(result.cells) == 2
+    assert {cell.status for row in result.cells for cell in row} == {Status.ERROR}
+    assert result.cells[0][0].message == "ValueError: bad thing <object object at 0x...>"
+
+
+def test_what_is_written_is_read_from_many_ranks_and_in_pieces(tmp_path):
+    reader = ShardReader(tmp_path)
+    with ShardWriter(tmp_path, "run", 0) as zero, ShardWriter(tmp_path, "run", 1) as one:
+        zero.append(record(0))
+        one.append(record(1))
+        assert set(reader.read()) == {Unit(0.7, 0), Unit(0.7, 1)}
+        zero.append(record(2))
+        assert set(reader.read()) == {Unit(0.7, r) for r in range(3)}
+    assert reader.damaged == 0
+
+
+def test_a_rank_without_units_leaves_no_file(tmp_path):
+    with ShardWriter(tmp_path, "run", 0):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_shard_is_cut_at_every_length_without_losing_a_whole_line(tmp_path):
+    with ShardWriter(tmp_path, "run", 0) as writer:
+        for r in range(3):
+            writer.append(record(r))
+    data = writer.path.read_bytes()
+    ends = [i + 1 for i, byte in enumerate(data) if byte == ord("\n")]
+    for length in range(0, len(data) + 1, 7):
+        writer.path.write_bytes(data[:length])
+        assert len(ShardReader(tmp_path).read()) == sum(end <= length for end in ends)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 255))
+def test_a_changed_byte_is_noticed(place, change):
+    line = bytearray(frame(encode(record(1))))
+    line[place % len(line)] ^= change
+    assert unframe(bytes(line)) is None
+
+
+def test_damaged_lines_are_counted_and_the_others_kept(tmp_path):
+    with ShardWriter(tmp_path, "run", 0) as writer:
+        for r in range(3):
+            writer.append(record(r))
+    data = bytearray(writer.path.read_bytes())
+    data[data.index(b"\n") + 40] ^= 1
+    writer.path.write_bytes(data)
+    reader = ShardReader(tmp_path)
+    assert set(reader.read()) == {Unit(0.7, 0), Unit(0.7, 2)}
+    assert reader.damaged == 1
+
+
+def test_of_a_unit_run_twice_the_first_file_counts(tmp_path):
+    for run, value in (("20260101", 0.1), ("20260102", 0.2)):
+        with ShardWriter(tmp_path, run, 0) as writer:
+            writer.append(record(0, value))
+    assert ShardReader(tmp_path).read()[Unit(0.7, 0)].result.cells[0][0].conductivity[0, 0] == 0.1
+
+
+def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, monkeypatch):
+    with ShardWriter(tmp_path, "run", 0) as writer:
+        writer.append(record(0))
+        write = os.write
+        monkeypatch.setattr(os, "write", lambda file, data: _half_then_full(write, file, data))
+        with pytest.raises(OutputError, match=r"No space left on device.*--resume"):
+            writer.append(record(1))
+        monkeypatch.undo()
+        writer.append(record(2))
+    reader = ShardReader(tmp_path)
+    assert set(reader.read()) == {Unit(0.7, 0), Unit(0.7, 2)}
+    assert reader.damaged == 0
+
+
+def _half_then_full(write, file, data):
+    if len(data) < 200:
+        raise OSError(28, "No space left on device")
+    return write(file, data[: len(data) - 100])
+
+
+def test_an_atomic_write_replaces_whole_files_only(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_atomically(path, b"one")
+    monkeypatch.setattr(os, "fsync", _no_space)
+    with pytest.raises(OSError, match="No space"):
+        write_atomically(path, b"two")
+    assert path.read_bytes() == b"one"
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def _no_space(_file):
+    raise OSError(28, "No space left on device")
