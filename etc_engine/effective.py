@@ -174,7 +174,7 @@ def _check_balance(solution: SteadySolution) -> None:
 def mean_field_conductivity(
     network: ContactNetwork,
     *,
-    method: str = "chord",
+    resistance: str = "chord",
     conductivity: ArrayLike = 1.0,
     contact_resistance: ArrayLike = 0.0,
 ) -> float:
@@ -184,8 +184,10 @@ def mean_field_conductivity(
 
     Parameters
     ----------
-    network, method, conductivity, contact_resistance
+    network, conductivity, contact_resistance
         As in `effective_conductivity`.
+    resistance : str
+        Self-resistance h_ii of a pipe, a method with one in closed form.
 
     Returns
     -------
@@ -207,7 +209,7 @@ def mean_field_conductivity(
     n, m = network.packing.count, network.count
     kappa = np.broadcast_to(np.asarray(conductivity, dtype=np.float64), (n,))
     contact = np.broadcast_to(np.asarray(contact_resistance, dtype=np.float64), (m + network.walls.size,))
-    sides = self_resistance(network.angles, method) / kappa[network.pairs]
+    sides = self_resistance(network.angles, resistance) / kappa[network.pairs]
     conductance = 1.0 / (sides.sum(axis=1) + contact[:m])
     squares = (network.branches**2).sum(axis=1)
     return float(conductance @ squares / (2.0 * network.packing.box.volume))

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+
+from etc_engine.contacts import ContactNetwork, bonded_contacts, overlap_contacts
+from etc_engine.dtem.methods import METHODS as DTEM_METHODS
+from etc_engine.effective import effective_conductivity, find_backbones, mean_field_conductivity
+from etc_engine.errors import ConvergenceError, EtcError, InputError, PackingError
+from etc_engine.packing import PackingSpec, ParticlePacking, pack
+from etc_engine.packing.structure import solid_fraction
+from etc_engine.percolation import Backbone
 
 
 class Status(IntEnum):
@@ -72,7 +81,7 @@ class ConductionSpec:
 class RealizationSpec:
     """Everything that defines one realization but its random stream."""
 
-    packing: object  # etc_engine.packing.PackingSpec, its density included
+    packing: PackingSpec
     contacts: ContactSpec
     conduction: ConductionSpec
 
@@ -82,6 +91,7 @@ class Cell:
     """The outcome for one contact angle and one method.
 
     ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
+    ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network.
     """
 
     status: Status
@@ -94,6 +104,10 @@ class Cell:
     iterations: int = 0
     relative_energy_error: float = np.nan
     solve_seconds: float = 0.0
+    mean_field_conductivity: float = np.nan
+
+
+Cells = tuple[tuple[Cell, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -104,15 +118,118 @@ class Realization:
     density: float
     solid_fraction: float
     pack_seconds: float
-    cells: tuple[tuple[Cell, ...], ...]
+    cells: Cells
 
 
 def realize(spec: RealizationSpec, rng: np.random.Generator) -> Realization:
     """Pack once, then solve every contact angle and method on that packing.
 
     Failures of the packer or the solver are recorded in the cells, not raised.
+
+    Parameters
+    ----------
+    spec : RealizationSpec
+    rng : numpy.random.Generator
+        The random stream of this realization; nothing else is random.
+
+    Returns
+    -------
+    Realization
     """
-    raise NotImplementedError
+    start = time.perf_counter()
+    try:
+        packing = pack(spec.packing, rng)
+    except PackingError as error:
+        failed = Cell(Status.PACKING_FAILED, str(error))
+        return Realization(0, np.nan, np.nan, time.perf_counter() - start, _uniform(spec, failed))
+    seconds = time.perf_counter() - start
+    return Realization(
+        packing.count,
+        packing.density,
+        solid_fraction(packing),
+        seconds,
+        ENGINES[spec.conduction.engine].conduct(packing, spec, rng),
+    )
 
 
-ENGINES: Mapping[str, Callable[..., Cell]] = {}
+def _uniform(spec: RealizationSpec, cell: Cell) -> Cells:
+    return ((cell,) * len(spec.conduction.methods),) * max(len(spec.contacts.contact_angles), 1)
+
+
+def conduct_dtem(packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator) -> Cells:  # noqa: ARG001
+    """Discrete thermal element method on one packing; contacts and backbone serve all angles and methods."""
+    angles: tuple[float | None, ...] = spec.contacts.contact_angles or (None,)
+    try:
+        network = contact_network(packing, spec.contacts)
+        backbones = find_backbones(network)
+    except EtcError as error:
+        return _uniform(spec, Cell(Status.ERROR, str(error)))
+    return tuple(
+        tuple(
+            _dtem_cell(network if angle is None else network.with_half_angle(angle), backbones, spec.conduction, method)
+            for method in spec.conduction.methods
+        )
+        for angle in angles
+    )
+
+
+def contact_network(packing: ParticlePacking, contacts: ContactSpec) -> ContactNetwork:
+    """Contacts of a packing by the rule of a study; bonded ones with the first of the half-angles."""
+    if contacts.rule == "overlap":
+        return overlap_contacts(packing)
+    if contacts.rule == "bonded":
+        return bonded_contacts(packing, contacts.contact_angles[0], contacts.bond_gap)
+    raise InputError(f"unknown contact rule {contacts.rule!r}: expected overlap or bonded")
+
+
+def _dtem_cell(
+    network: ContactNetwork, backbones: Mapping[tuple[int, ...], Backbone], conduction: ConductionSpec, method: str
+) -> Cell:
+    start = time.perf_counter()
+    kappa, resistance = conduction.conductivity, conduction.contact_resistance
+    try:
+        result = effective_conductivity(
+            network,
+            method=method,
+            conductivity=kappa,
+            contact_resistance=resistance,
+            tolerance=conduction.tolerance,
+            backbones=backbones,
+        )
+    except ConvergenceError as error:
+        return Cell(Status.NOT_CONVERGED, str(error))
+    except EtcError as error:
+        return Cell(Status.ERROR, str(error))
+    missing = result.missing_axes
+    return Cell(
+        status=Status.NOT_PERCOLATING if missing else Status.OK,
+        message=f"no path of contacts along {missing}" if missing else "",
+        conductivity=result.tensor,
+        contacts=network.count,
+        wall_contacts=network.walls.size,
+        coordination=network.coordination,
+        unknowns=result.unknowns,
+        iterations=result.iterations,
+        relative_energy_error=result.relative_energy_error,
+        mean_field_conductivity=mean_field_conductivity(network, conductivity=kappa, contact_resistance=resistance),
+        solve_seconds=time.perf_counter() - start,
+    )
+
+
+@dataclass(frozen=True)
+class Engine:
+    """One way to conduct heat through a packing.
+
+    Parameters
+    ----------
+    conduct : callable
+        (packing, spec, rng) -> cells, by contact angle and method.
+    methods : tuple of str
+        The variants it knows.
+    """
+
+    conduct: Callable[[ParticlePacking, RealizationSpec, np.random.Generator], Cells]
+    methods: tuple[str, ...]
+
+
+ENGINES: Mapping[str, Engine] = {"dtem": Engine(conduct_dtem, tuple(DTEM_METHODS))}

@@ -52,6 +52,9 @@ CELL_VARIABLES = {
     "unknowns": Variable(np.int64, -1, "number of unknowns of the linear system, after pruning"),
     "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
     "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
+    "mean_field_conductivity": Variable(
+        np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
+    ),
     "solve_seconds": Variable(np.float64, np.nan, "time to solve", "s"),
 }
 UNIT_VARIABLES = {

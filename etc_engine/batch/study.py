@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -24,12 +24,9 @@ from pydantic_core import ErrorDetails
 
 from etc_engine.box import Box, parse_periodic
 from etc_engine.errors import InputError, StudyError
-from etc_engine.realization import ConductionSpec, ContactSpec, RealizationSpec
+from etc_engine.packing import PackingSpec, RadiusDistribution, parse_radii
+from etc_engine.realization import ENGINES, ConductionSpec, ContactSpec, RealizationSpec
 
-METHODS: Mapping[str, tuple[str, ...]] = {
-    "dtem": ("chord", "standard", "enhanced", "arc", "exact"),
-    "pipe": ("chord", "uniform"),
-}
 DEFAULT_CAP = 10
 """Without ``max_realizations`` an adaptive sweep stops at this many times ``realizations``."""
 
@@ -48,6 +45,12 @@ def _without_repeats(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(sorted(_without_repeats(values)))
+
+
+def _known_engine(word: str) -> str:
+    if word not in ENGINES:
+        raise ValueError(f"found {word!r}, allowed: {', '.join(ENGINES)}")
+    return word
 
 
 Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
@@ -127,9 +130,7 @@ class ContactsTable(_Table):
 class ConductionTable(_Table):
     """``[conduction]``: how the heat conduction is solved."""
 
-    engine: Literal["dtem", "pipe", "lattice", "voxel"] = Field(
-        default="dtem", description="dtem, pipe, lattice or voxel"
-    )
+    engine: Annotated[Word, AfterValidator(_known_engine)] = Field(default="dtem", description="the word of an engine")
     method: Word | Annotated[tuple[Word, ...], AfterValidator(_without_repeats), Field(min_length=1)] = Field(
         default="chord", description="a method of the engine, or a list of different ones"
     )
@@ -148,9 +149,7 @@ class ConductionTable(_Table):
 
     @model_validator(mode="after")
     def _check(self) -> ConductionTable:
-        allowed = METHODS.get(self.engine)
-        if allowed is None:
-            raise ValueError(f"engine {self.engine!r} is not available in a sweep, allowed: {', '.join(METHODS)}")
+        allowed = ENGINES[self.engine].methods
         for method in self.methods:
             if method not in allowed:
                 raise ValueError(f"method: found {method!r}, allowed with {self.engine}: {', '.join(allowed)}")
@@ -242,8 +241,6 @@ class Study(_Table):
 
     def realization_spec(self, density: float | None) -> RealizationSpec:
         """The specification of one realization at a density of this study (None: the packer's own)."""
-        from etc_engine.packing import PackingSpec  # type: ignore[attr-defined]
-
         packing, contacts, conduction = self.packing, self.contacts, self.conduction
         return RealizationSpec(
             packing=PackingSpec(
@@ -253,6 +250,7 @@ class Study(_Table):
                 count=packing.count,
                 density=density,
                 growth_rate=packing.growth_rate,
+                radius_growth=contacts.rule != "bonded",
             ),
             contacts=ContactSpec(
                 rule=contacts.rule,
@@ -307,9 +305,7 @@ def parse_study(text: str, source: str = "study") -> Study:
         raise StudyError(f"{source}: {_one_line(error)}") from None
 
 
-def _parse_radii(text: str) -> object:
-    from etc_engine.packing import parse_radii  # type: ignore[attr-defined]
-
+def _parse_radii(text: str) -> RadiusDistribution:
     try:
         return parse_radii(text)
     except InputError as error:
