@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from etc_engine.box import Box
+from etc_engine.cli import run
 from etc_engine.packing.particles import ParticlePacking
 
 DATA = Path(__file__).parent / "published" / "data"
@@ -29,3 +31,25 @@ def hexagonal():
         return ParticlePacking(centers, np.full(len(centers), 0.5), Box((nx, ny * height), (True, True)))
 
     return build
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command line ended."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def etc_engine(capsys):
+    """Run a command line inside this process: ``etc_engine("solve", path, "--box", "1,1")``."""
+
+    def call(*arguments: object) -> Done:
+        capsys.readouterr()
+        status = run([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return Done(status, captured.out, captured.err)
+
+    return call
