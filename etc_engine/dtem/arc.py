@@ -54,7 +54,7 @@ def arc_elements(sides: ContactSides, material: Material, modes: int = MODES) ->
         sides.offsets,
         sides.theta,
         sides.alpha,
-        _signs(sides),
+        sides.mode_signs,
         material.side_resistances(sides),
         material.conductivity,
         modes,
@@ -75,19 +75,12 @@ def arc_potentials(sides: ContactSides, material: Material, flows: NDArray[np.fl
         sides.offsets,
         sides.theta,
         sides.alpha,
-        _signs(sides),
+        sides.mode_signs,
         material.side_resistances(sides),
         material.conductivity,
         np.ascontiguousarray(flows),
         *_quadrature(modes),
     )
-
-
-def _signs(sides: ContactSides) -> NDArray[np.float64]:
-    """-1 at the second side of a particle contact, whose s runs the other way: odd modes change sign there."""
-    signs = np.ones(sides.nodes.size)
-    signs[sides.of_contacts[:, 1]] = -1.0
-    return signs
 
 
 def _quadrature(modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -32,6 +32,11 @@ class ParticleField:
         Heat flow from the first particle of each contact to the second.
     wall_flows : ndarray, shape (w,) [W/m]
         Heat flow from the particle into each wall.
+    face_temperatures : ndarray, shape (m, 2) [K]
+        Temperature of the face of each particle contact on either particle, T_node - R_c Q_into / 2, in the
+        frame of the first particle. Equal where there is no contact resistance.
+    flow_modes : ndarray, shape (s, M) [W/m]
+        Flux modes into the particle at each side.
     """
 
     sides: ContactSides
@@ -40,6 +45,8 @@ class ParticleField:
     wall_temperatures: NDArray[np.float64]
     contact_flows: NDArray[np.float64]
     wall_flows: NDArray[np.float64]
+    face_temperatures: NDArray[np.float64]
+    flow_modes: NDArray[np.float64]
 
 
 def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
@@ -93,13 +100,17 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
 
     open_walls = np.flatnonzero(np.isnan(at_wall))
     at_wall[open_walls] = temperatures[network.wall_particles[open_walls]] + potentials[sides.of_walls[open_walls]]
+    at_contact = temperatures[network.pairs[:, 0]] + potentials[sides.of_contacts[:, 0]]
+    drops = 0.5 * solution.material.contact_resistance[: network.count, None] * flows[sides.of_contacts, 0]
     return ParticleField(
         sides=sides,
         particle_temperatures=temperatures,
-        contact_temperatures=temperatures[network.pairs[:, 0]] + potentials[sides.of_contacts[:, 0]],
+        contact_temperatures=at_contact,
         wall_temperatures=at_wall,
         contact_flows=flows[sides.of_contacts[:, 1], 0],
         wall_flows=-flows[sides.of_walls, 0],
+        face_temperatures=at_contact[:, None] - drops,
+        flow_modes=flows,
     )
 
 

@@ -27,18 +27,23 @@ class Method:
         (sides, material) -> Elements.
     potentials : callable
         (sides, material, flows of shape (s, modes)) -> arc temperatures above the particle's mean, shape (s,).
+    uniform_flux : bool
+        Whether the flux is uniform over an arc; otherwise it follows Chebyshev modes over sqrt(1 - s^2).
     """
 
     elements: Callable[[ContactSides, Material], Elements]
     potentials: Callable[[ContactSides, Material, NDArray[np.float64]], NDArray[np.float64]]
+    uniform_flux: bool
 
 
 METHODS: Mapping[str, Method] = {
     **{
-        name: Method(partial(closed_form_elements, method=name), partial(closed_form_potentials, method=name))
+        name: Method(
+            partial(closed_form_elements, method=name), partial(closed_form_potentials, method=name), name != "chord"
+        )
         for name in SELF_RESISTANCE
     },
-    "arc": Method(arc_elements, arc_potentials),
+    "arc": Method(arc_elements, arc_potentials, uniform_flux=False),
 }
 
 

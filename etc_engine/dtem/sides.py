@@ -48,6 +48,13 @@ class ContactSides:
         """Particle of each side, shape (s,)."""
         return np.repeat(np.arange(self.offsets.size - 1), np.diff(self.offsets))
 
+    @property
+    def mode_signs(self) -> NDArray[np.float64]:
+        """-1 at the second side of a particle contact, whose arc runs the other way: odd modes change sign there."""
+        signs = np.ones(self.nodes.size)
+        signs[self.of_contacts[:, 1]] = -1.0
+        return signs
+
 
 def contact_sides(network: ContactNetwork) -> ContactSides:
     """The two sides of every particle contact and the one side of every wall contact, by particle."""
