@@ -8,6 +8,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -43,9 +44,38 @@ def _plain(value: Any) -> Any:
     return value
 
 
+PICTURES = (".png", ".svg", ".pdf", ".jpg")
+
+
+def check_picture(path: Path) -> None:
+    """Refuse a picture whose format is not known, or where matplotlib is not installed.
+
+    Raises
+    ------
+    InputError
+    """
+    if path.suffix.lower() not in PICTURES:
+        raise InputError(f"a picture is written as {', '.join(PICTURES)}: found {str(path)!r}")
+    if find_spec("matplotlib") is None:
+        raise InputError("pictures need matplotlib: install the extra with pip install 'etc-engine[plot]'")
+
+
+def check_place(path: Path) -> None:
+    """Refuse an output that cannot be written, before the work begins.
+
+    Raises
+    ------
+    OutputError
+    """
+    with replacing(path, keep=False):
+        pass
+
+
 @contextmanager
-def replacing(path: Path | str) -> Iterator[Path]:
+def replacing(path: Path | str, *, keep: bool = True) -> Iterator[Path]:
     """A temporary neighbour of a file that takes its place when the block ends well, and vanishes otherwise.
+
+    With ``keep=False`` it vanishes in any case: a trial.
 
     Raises
     ------
@@ -63,6 +93,8 @@ def replacing(path: Path | str) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
+        if not keep:
+            return
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)

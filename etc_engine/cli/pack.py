@@ -40,7 +40,7 @@ def pack_command(
     """Make a random packing and write it as CSV."""
     from numpy.random import SeedSequence, default_rng
 
-    from etc_engine.cli.options import parse_box, print_json, replacing
+    from etc_engine.cli.options import check_picture, check_place, parse_box, print_json, replacing
     from etc_engine.errors import InputError
     from etc_engine.packing import PackingSpec, pack
     from etc_engine.packing.files import ParticleTable, write_csv
@@ -57,6 +57,9 @@ def pack_command(
         density=density,
         growth_rate=growth_rate,
     )
+    if plot is not None:
+        check_picture(plot)
+        check_place(plot)
     seed = int(SeedSequence().generate_state(1)[0]) if seed is None else seed
     with replacing(output) as file:
         start = time.perf_counter()

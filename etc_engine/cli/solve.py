@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from etc_engine.contacts import ContactNetwork
+    from etc_engine.dtem.field import ParticleField
+    from etc_engine.effective import EffectiveConductivity
+    from etc_engine.packing.files import ParticleTable
 
 
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
-@click.option("--box", required=True, help="Edge lengths, such as 1,1.")
-@click.option("--periodic", default="", help="Periodic axes: x, y or xy; walls elsewhere.")
-@click.option("--method", default="chord", show_default=True, help="standard, enhanced or chord.")
+@click.option("--box", help="Edge lengths, such as 1,1; a dump brings its own.")
+@click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere. A dump brings its own.")
+@click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
+@click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced or arc.")
 @click.option(
-    "--contact-angle",
-    type=float,
-    help="Half-angle in degrees of bonded contacts; without it contacts are overlaps.",
+    "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
 )
 @click.option("--bond-gap", type=float, default=1e-6, show_default=True, help="Largest bonded gap, in mean radii.")
 @click.option(
-    "--conductivity", type=float, help="Conductivity of the particles [W/(m K)]; 1 by default, or the file's."
+    "--conductivity", type=float, help="Conductivity of the particles [W/(m K)]; 1 by default, or the file's column."
 )
 @click.option(
     "--contact-resistance",
@@ -30,45 +38,60 @@ import click
     show_default=True,
     help="Resistance of a contact per unit thickness [m K/W].",
 )
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with particles, contacts and fields.")
+@click.option("--vtk", type=click.Path(path_type=Path), help="VTK PolyData (.vtp) for ParaView.")
+@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the temperature field.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def solve_command(
     particles: Path,
-    box: str,
-    periodic: str,
+    box: str | None,
+    periodic: str | None,
+    frame: int | None,
     method: str,
     contact_angle: float | None,
     bond_gap: float,
     conductivity: float | None,
     contact_resistance: float,
+    output: Path | None,
+    vtk: Path | None,
+    plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Effective conductivity of the disks in a CSV file with the columns x,y,radius[,conductivity].
+    """Effective conductivity of the disks in a file.
 
-    Walls at x = 0 (temperature 1) and x = L (temperature 0), unless the box is periodic along x.
+    PARTICLES is a CSV file with the columns x,y,radius[,conductivity] or a LAMMPS/LIGGGHTS text dump. Walls at
+    x = 0 (temperature 1) and x = L (temperature 0), unless the box is periodic along x.
     """
     start = time.perf_counter()
-    from etc_engine.cli.options import parse_box, print_json
+    from math import radians
+
+    from etc_engine.cli.options import print_json
     from etc_engine.contacts import bonded_contacts, overlap_contacts
+    from etc_engine.dtem.field import recover_field
     from etc_engine.effective import effective_conductivity
     from etc_engine.errors import InputError
-    from etc_engine.packing.files import read_csv
 
-    table = read_csv(particles, parse_box(box, periodic))
+    outputs = _Outputs(output, vtk, plot)
+    outputs.check()
+    table = _read(particles, box, periodic, frame)
     if conductivity is not None and table.conductivity is not None:
         raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
+    given = 1.0 if conductivity is None else conductivity
     if contact_angle is None:
         network = overlap_contacts(table.packing)
     else:
-        network = bonded_contacts(table.packing, contact_angle * 0.017453292519943295, bond_gap)
-    given = 1.0 if conductivity is None else conductivity
+        network = bonded_contacts(table.packing, radians(contact_angle), bond_gap)
     result = effective_conductivity(
         network,
         method=method,
-        conductivity=table.conductivity if table.conductivity is not None else given,
+        conductivity=given if table.conductivity is None else table.conductivity,
         contact_resistance=contact_resistance,
         axes=(0, 1) if all(table.packing.box.periodic) else (0,),
     )
-    record = _record(network, method, result)
+    field = recover_field(result.solutions[0])
+    record = _record(network, method, result, field)
+    _warn_of_close_arcs(method, result)
+    _write(outputs, result, field, record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
         print_json(record)
@@ -76,19 +99,101 @@ def solve_command(
         _print_table(record)
 
 
-def _record(network: Any, method: str, result: Any) -> dict[str, Any]:
-    from etc_engine.dtem.field import recover_field
-    from etc_engine.realization import Status
+def _read(particles: Path, box: str | None, periodic: str | None, frame: int | None) -> ParticleTable:
+    """A CSV file or a dump, told apart by their first word."""
+    from etc_engine.cli.options import parse_box
+    from etc_engine.errors import InputError
+    from etc_engine.packing.dumps import read_dump
+    from etc_engine.packing.files import read_csv
+
+    if _is_dump(particles):
+        if box is not None or periodic is not None:
+            raise InputError(f"{particles} is a dump that brings its own box: leave --box and --periodic out")
+        return read_dump(particles, -1 if frame is None else frame)
+    if frame is not None:
+        raise InputError(f"--frame goes with a dump; {particles} is none")
+    if box is None:
+        raise InputError("--box is missing: give the edge lengths of the box, such as --box 1,1")
+    return read_csv(particles, parse_box(box, periodic or ""))
+
+
+def _is_dump(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(5) == b"ITEM:"
+    except OSError:
+        return False  # the reader of CSV files says what is wrong
+
+
+@dataclass(frozen=True)
+class _Outputs:
+    """Files asked for."""
+
+    netcdf: Path | None
+    vtk: Path | None
+    plot: Path | None
+
+    def check(self) -> None:
+        """Refuse what cannot be written before the work begins."""
+        from etc_engine.cli.options import check_picture, check_place
+        from etc_engine.errors import InputError
+
+        if self.plot is not None:
+            check_picture(self.plot)
+        if self.vtk is not None and self.vtk.suffix != ".vtp":
+            raise InputError(f"VTK PolyData is written to a .vtp file, found {str(self.vtk)!r}")
+        for path in (self.netcdf, self.vtk, self.plot):
+            if path is not None:
+                check_place(path)
+
+
+def _write(outputs: _Outputs, result: EffectiveConductivity, field: ParticleField, record: dict[str, Any]) -> None:
+    """Write what was asked for: every file whole, or none of them."""
+    from etc_engine.cli.options import replacing
 
     solution = result.solutions[0]
-    field = recover_field(solution)
-    box = network.packing.box
+    with ExitStack() as files:
+        if outputs.netcdf is not None:
+            from etc_engine.results.single import solve_dataset
+
+            plain = {key: value for key, value in record.items() if key != "contact_temperatures"}
+            plain["percolates"] = int(plain["percolates"])
+            if "conductivity_tensor" in plain:
+                plain["conductivity_tensor"] = plain["conductivity_tensor"].ravel()
+            plain["command"] = " ".join(["etc-engine", *sys.argv[1:]])
+            file = files.enter_context(replacing(outputs.netcdf))
+            solve_dataset(solution, field, plain).to_netcdf(file, engine="netcdf4")
+        if outputs.vtk is not None:
+            from etc_engine.results.vtk import write_vtp
+
+            write_vtp(files.enter_context(replacing(outputs.vtk)), solution, field)
+        if outputs.plot is not None:
+            from etc_engine.figures import save_field
+
+            caption = f"{record['method']}: k = {record['conductivity']:.6g} W/(m K), {record['particles']} particles"
+            save_field(files.enter_context(replacing(outputs.plot)), solution, field, caption)
+
+
+def _warn_of_close_arcs(method: str, result: EffectiveConductivity) -> None:
+    from etc_engine.dtem.sides import count_close_arcs
+
+    close = count_close_arcs(result.solutions[0].sides)
+    if method != "exact" and close:
+        click.echo(
+            f"etc-engine: warning: {close} pairs of contacts on one particle are closer than the sum of their "
+            f"half-angles; {method} loses accuracy there, method exact does not",
+            err=True,
+        )
+
+
+def _record(
+    network: ContactNetwork, method: str, result: EffectiveConductivity, field: ParticleField
+) -> dict[str, Any]:
+    from etc_engine.realization import Status
+
     percolates = bool(result.spans[0])
-    record: dict[str, Any] = {
-        "method": method,
-        "conductivity": float(result.tensor[0, 0]),
-    }
-    if all(box.periodic):
+    record: dict[str, Any] = {"method": method, "conductivity": float(result.tensor[0, 0])}
+    if all(network.packing.box.periodic):
         record["conductivity_tensor"] = result.tensor
     return record | {
         "particles": network.packing.count,

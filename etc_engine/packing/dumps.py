@@ -1,0 +1,184 @@
+"""Text dumps of the DEM codes LAMMPS and LIGGGHTS: frames in, a frame out."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.box import AXES, Box
+from etc_engine.errors import InputError
+from etc_engine.packing.files import ParticleTable
+from etc_engine.packing.particles import ParticlePacking
+
+FLAT = 1e-9
+"""Centres whose heights differ by less than this part of the largest radius lie in one plane."""
+
+
+class _Frame(NamedTuple):
+    """One frame as it stands in the file."""
+
+    timestep: int
+    box_header: list[str]
+    box_lines: list[str]
+    columns: list[str]
+    atoms: list[str]
+
+
+def read_dump(path: Path | str, frame: int = -1) -> ParticleTable:
+    """Particles of one frame of a text dump.
+
+    Parameters
+    ----------
+    path : path
+    frame : int
+        Number of the frame from 0; -1 is the last.
+
+    Returns
+    -------
+    ParticleTable
+        Sorted by ``id`` where the dump has one. The box and its periodic axes are the file's (flag ``p`` is
+        periodic, ``f``, ``s`` and ``m`` are walls), moved to the origin. Centres in one plane make a
+        two-dimensional packing.
+
+    Raises
+    ------
+    InputError, GeometryError
+        If the file is missing or not such a dump, the box is triclinic, positions or a radius (diameter) are
+        missing, or there is no such frame.
+    """
+    path = Path(path)
+    frames = list(_frames(path))
+    if not -len(frames) <= frame < len(frames):
+        raise InputError(f"{path} holds {len(frames)} frames, numbered from 0: there is no frame {frame}")
+    return _particles(path, frames[frame])
+
+
+def count_frames(path: Path | str) -> int:
+    """Number of frames of a text dump."""
+    return sum(1 for _ in _frames(Path(path)))
+
+
+def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> None:
+    """Write particles as one frame of a LAMMPS text dump, with as many digits as read back the same numbers."""
+    packing = table.packing
+    flags = [("pp" if flag else "ff") for flag in packing.box.periodic]
+    lengths = list(packing.box.lengths)
+    if packing.dimension == 2:  # LAMMPS keeps a slab of unit height about a plane, periodic across it
+        flags, bounds = [*flags, "pp"], [*((0.0, length) for length in lengths), (-0.5, 0.5)]
+    else:
+        bounds = [(0.0, length) for length in lengths]
+    heights = packing.centers[:, 2] if packing.dimension == 3 else np.zeros(packing.count)
+    columns = [*packing.centers.T[:2], heights, packing.radii]
+    names = "id type x y z radius"
+    if table.conductivity is not None:
+        columns.append(table.conductivity)
+        names += " conductivity"
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"ITEM: TIMESTEP\n{timestep}\nITEM: NUMBER OF ATOMS\n{packing.count}\n")
+        file.write(f"ITEM: BOX BOUNDS {' '.join(flags)}\n")
+        file.writelines(f"{low!r} {high!r}\n" for low, high in bounds)
+        file.write(f"ITEM: ATOMS {names}\n")
+        rows = zip(*(column.tolist() for column in columns), strict=True)
+        file.writelines(f"{number + 1} 1 {' '.join(map(repr, row))}\n" for number, row in enumerate(rows))
+
+
+def _frames(path: Path) -> Iterator[_Frame]:
+    """Frames of the file, one after the other."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"there is no file {path}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as a text dump: {error}") from None
+    lines = iter(text.splitlines())
+    number = 0
+    for line in lines:
+        if not line.strip():
+            continue
+        if line.strip() != "ITEM: TIMESTEP":
+            raise InputError(f"{path} is not a LAMMPS text dump: expected 'ITEM: TIMESTEP', found {line[:40]!r}")
+        try:
+            yield _frame(lines)
+        except (StopIteration, ValueError, IndexError):
+            raise InputError(f"{path}: frame {number} is cut short or malformed") from None
+        number += 1
+    if not number:
+        raise InputError(f"{path} holds no frames")
+
+
+def _frame(lines: Iterator[str]) -> _Frame:
+    timestep = int(next(lines))
+    if next(lines).strip() != "ITEM: NUMBER OF ATOMS":
+        raise ValueError
+    count = int(next(lines))
+    box_header = next(lines).split()
+    if box_header[:3] != ["ITEM:", "BOX", "BOUNDS"]:
+        raise ValueError
+    box_lines = [next(lines) for _ in range(3)]
+    columns = next(lines).split()
+    if columns[:2] != ["ITEM:", "ATOMS"]:
+        raise ValueError
+    atoms = [next(lines) for _ in range(count)]
+    return _Frame(timestep, box_header[3:], box_lines, columns[2:], atoms)
+
+
+def _particles(path: Path, frame: _Frame) -> ParticleTable:
+    if not frame.atoms:
+        raise InputError(f"{path}: the frame at step {frame.timestep} holds no particles")
+    if "xy" in frame.box_header:
+        raise InputError(f"{path} has a triclinic box; only boxes with right angles are understood")
+    bounds = np.array([[float(word) for word in line.split()[:2]] for line in frame.box_lines])
+    try:
+        values = np.loadtxt(io.StringIO("\n".join(frame.atoms)), ndmin=2)
+    except ValueError as error:
+        raise InputError(f"{path}: the frame at step {frame.timestep} is not a table of numbers: {error}") from None
+    if values.shape[1] != len(frame.columns):
+        raise InputError(f"{path}: {len(frame.columns)} columns are named, {values.shape[1]} found")
+    columns = dict(zip(frame.columns, values.T, strict=True))
+    if "id" in columns:
+        order = np.argsort(columns["id"], kind="stable")
+        columns = {name: column[order] for name, column in columns.items()}
+    radii = _radii(path, columns)
+    positions = [
+        _positions(path, columns, axis, bounds[axis]) for axis in range(3) if axis < 2 or "z" in _spelled(columns)
+    ]
+    flat = len(positions) == 2 or np.ptp(positions[2]) <= FLAT * radii.max()
+    dimension = 2 if flat else 3
+    box = Box(
+        tuple(float(high - low) for low, high in bounds[:dimension]),
+        tuple(flag.startswith("p") for flag in (frame.box_header or ["ff"] * 3)[:dimension]),
+    )
+    centers = np.stack(positions[:dimension], axis=1) - bounds[:dimension, 0]
+    return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"))
+
+
+def _spelled(columns: dict[str, NDArray[np.float64]]) -> set[str]:
+    """Axes for which there is a position column in any spelling."""
+    return {axis for axis in AXES for ending in ("", "u", "s", "su") if axis + ending in columns}
+
+
+def _positions(
+    path: Path, columns: dict[str, NDArray[np.float64]], axis: int, bounds: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Coordinates along an axis: ``x``, unwrapped ``xu``, or scaled to the box ``xs``, ``xsu``."""
+    name = AXES[axis]
+    for ending in ("", "u"):
+        if name + ending in columns:
+            return columns[name + ending]
+    for ending in ("s", "su"):
+        if name + ending in columns:
+            return bounds[0] + columns[name + ending] * (bounds[1] - bounds[0])
+    raise InputError(f"{path} has no column of {name} positions ({name}, {name}u, {name}s); found {', '.join(columns)}")
+
+
+def _radii(path: Path, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    if "radius" in columns:
+        return columns["radius"]
+    if "diameter" in columns:
+        return 0.5 * columns["diameter"]
+    raise InputError(f"{path} has neither a radius nor a diameter column; found {', '.join(columns)}")

@@ -1,0 +1,1 @@
+"""What is written for users: netCDF and VTK of a single solve."""
