@@ -143,7 +143,8 @@ def effective_conductivity(
         for axis, flag in zip(group, solution.backbone.spans, strict=True):
             spans[axis] = flag
         if box.periodic[group[0]]:
-            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume
+            spanned = np.outer(solution.backbone.spans, solution.backbone.spans)
+            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume * spanned
         else:
             axis = group[0]
             _check_balance(solution)

@@ -53,6 +53,22 @@ class ContactSpec:
 
 
 @dataclass(frozen=True)
+class Mixture:
+    """A second material, given to randomly chosen particles.
+
+    Parameters
+    ----------
+    conductivity : float [W/(m K)]
+        Its conductivity.
+    fraction : float
+        Its number fraction, met to the nearest particle.
+    """
+
+    conductivity: float
+    fraction: float
+
+
+@dataclass(frozen=True)
 class ConductionSpec:
     """How the heat conduction through a contact network is solved.
 
@@ -66,6 +82,8 @@ class ConductionSpec:
         Conductivity of the particles.
     contact_resistance : float [m K/W]
         Total resistance of a contact per unit thickness.
+    mixture : Mixture, optional
+        A second material for part of the particles.
     tolerance : float
         Relative error of the conductivity left by the iterative solver.
     """
@@ -74,6 +92,7 @@ class ConductionSpec:
     methods: tuple[str, ...] = ("chord",)
     conductivity: float = 1.0
     contact_resistance: float = 0.0
+    mixture: Mixture | None = None
     tolerance: float = 1e-10
 
 
@@ -156,7 +175,16 @@ def _uniform(spec: RealizationSpec, cell: Cell) -> Cells:
     return ((cell,) * len(spec.conduction.methods),) * max(len(spec.contacts.contact_angles), 1)
 
 
-def conduct_dtem(packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator) -> Cells:  # noqa: ARG001
+def particle_conductivities(count: int, conduction: ConductionSpec, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Conductivity of each particle, shape (count,) [W/(m K)]; a mixture's second material at random places."""
+    conductivities = np.full(count, conduction.conductivity)
+    if conduction.mixture is not None:
+        chosen = rng.permutation(count)[: round(conduction.mixture.fraction * count)]
+        conductivities[chosen] = conduction.mixture.conductivity
+    return conductivities
+
+
+def conduct_dtem(packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator) -> Cells:
     """Discrete thermal element method on one packing; contacts and backbone serve all angles and methods."""
     angles: tuple[float | None, ...] = spec.contacts.contact_angles or (None,)
     try:
@@ -164,9 +192,12 @@ def conduct_dtem(packing: ParticlePacking, spec: RealizationSpec, rng: np.random
         backbones = find_backbones(network)
     except EtcError as error:
         return _uniform(spec, Cell(Status.ERROR, str(error)))
+    kappa = particle_conductivities(packing.count, spec.conduction, rng)
     return tuple(
         tuple(
-            _dtem_cell(network if angle is None else network.with_half_angle(angle), backbones, spec.conduction, method)
+            _dtem_cell(
+                network if angle is None else network.with_half_angle(angle), backbones, spec.conduction, kappa, method
+            )
             for method in spec.conduction.methods
         )
         for angle in angles
@@ -183,10 +214,14 @@ def contact_network(packing: ParticlePacking, contacts: ContactSpec) -> ContactN
 
 
 def _dtem_cell(
-    network: ContactNetwork, backbones: Mapping[tuple[int, ...], Backbone], conduction: ConductionSpec, method: str
+    network: ContactNetwork,
+    backbones: Mapping[tuple[int, ...], Backbone],
+    conduction: ConductionSpec,
+    kappa: NDArray[np.float64],
+    method: str,
 ) -> Cell:
     start = time.perf_counter()
-    kappa, resistance = conduction.conductivity, conduction.contact_resistance
+    resistance = conduction.contact_resistance
     try:
         result = effective_conductivity(
             network,

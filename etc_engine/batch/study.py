@@ -25,7 +25,7 @@ from pydantic_core import ErrorDetails
 from etc_engine.box import Box, parse_periodic
 from etc_engine.errors import InputError, StudyError
 from etc_engine.packing import PackingSpec, RadiusDistribution, parse_radii
-from etc_engine.realization import ENGINES, ConductionSpec, ContactSpec, RealizationSpec
+from etc_engine.realization import ENGINES, ConductionSpec, ContactSpec, Mixture, RealizationSpec
 
 DEFAULT_CAP = 10
 """Without ``max_realizations`` an adaptive sweep stops at this many times ``realizations``."""
@@ -127,6 +127,13 @@ class ContactsTable(_Table):
         return self
 
 
+class MixtureTable(_Table):
+    """``mixture`` of ``[conduction]``: a second material for part of the particles."""
+
+    conductivity: Positive = Field(description="a positive number [W/(m K)]")
+    fraction: Annotated[float, Field(strict=True, ge=0.0, le=1.0)] = Field(description="a number from 0 to 1")
+
+
 class ConductionTable(_Table):
     """``[conduction]``: how the heat conduction is solved."""
 
@@ -137,6 +144,9 @@ class ConductionTable(_Table):
     conductivity: Positive = Field(default=1.0, description="a positive number [W/(m K)]")
     contact_resistance: Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)] = Field(
         default=0.0, description="a number of at least 0 [m K/W]"
+    )
+    mixture: MixtureTable | None = Field(
+        default=None, description="a table such as { conductivity = 10.0, fraction = 0.3 }"
     )
     tolerance: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] = Field(
         default=1e-10, description="a relative error of the conductivity, between 0 and 1"
@@ -242,6 +252,7 @@ class Study(_Table):
     def realization_spec(self, density: float | None) -> RealizationSpec:
         """The specification of one realization at a density of this study (None: the packer's own)."""
         packing, contacts, conduction = self.packing, self.contacts, self.conduction
+        mixture = conduction.mixture
         return RealizationSpec(
             packing=PackingSpec(
                 method=packing.method,
@@ -263,6 +274,7 @@ class Study(_Table):
                 methods=conduction.methods,
                 conductivity=conduction.conductivity,
                 contact_resistance=conduction.contact_resistance,
+                mixture=None if mixture is None else Mixture(mixture.conductivity, mixture.fraction),
                 tolerance=conduction.tolerance,
             ),
         )

@@ -28,6 +28,9 @@ from etc_engine.errors import ConvergenceError
 # Below this many unknowns one sparse factorisation is faster than a multigrid hierarchy.
 EXACT_LEVEL = 20_000
 
+# An energy below this part of the lift's is round-off of zero; errors are then relative to this.
+ROUND_OFF = 1e-13
+
 
 @dataclass(frozen=True, eq=False)
 class Preconditioner:
@@ -146,7 +149,7 @@ def solve_energy(
     initial : ndarray, shape (n,), optional
         Starting guess, zero by default.
     tolerance : float
-        Stop when the estimate of |u - u_k|_K^2 is at most ``tolerance * E`` ...
+        Stop when the estimate of |u - u_k|_K^2 is at most ``tolerance * E`` (E at least 1e-13 of the lift's) ...
     balance_tolerance : float
         ... and |sum r| is at most ``balance_tolerance * E``.
     max_iterations : int
@@ -216,9 +219,9 @@ def solve_energy(
         rho_next = float(r @ z)
         ratios.append(rho_next / rho)
         # E_lift - 2 b.u + u.K u, which holds for any iterate
-        energy = lift_energy - float(u @ (rhs + r))
-        error = max(radau_factor(steps, ratios) * rho_next, 0.0) / energy if energy > 0.0 else np.inf
-        imbalance = abs(float(r.sum())) / energy if energy > 0.0 else np.inf
+        energy = max(lift_energy - float(u @ (rhs + r)), ROUND_OFF * lift_energy)
+        error = max(radau_factor(steps, ratios) * rho_next, 0.0) / energy
+        imbalance = abs(float(r.sum())) / energy
         if error <= tolerance and imbalance <= balance_tolerance:
             return u, report(error, imbalance)
         rho = rho_next

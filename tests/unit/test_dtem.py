@@ -253,3 +253,14 @@ def test_bad_conductivities_are_refused(value):
 def test_wrong_number_of_conductivities_is_refused():
     with pytest.raises(InputError, match=r"shape \(64,\), found \(3,\)"):
         effective_conductivity(overlap_contacts(random_disks(9)), conductivity=[1.0, 2.0, 3.0])
+
+
+def test_a_row_that_wraps_around_one_axis_conducts_nothing_along_the_other():
+    """The load across the row has no energy at all: 0, exactly, and no complaint of the solver."""
+    row = [[0.1 + 0.2 * i, 0.5 + 0.01 * (-1) ** i] for i in range(10)]
+    packing = ParticlePacking(row, [0.11] * 10, Box((2.0, 1.0), (True, True)))
+    for method in ("chord", "arc"):
+        result = effective_conductivity(overlap_contacts(packing), method=method)
+        assert result.spans == (True, False)
+        assert result.tensor[0, 0] > 0.0
+        assert result.tensor[1].tolist() == result.tensor[:, 1].tolist() == [0.0, 0.0]

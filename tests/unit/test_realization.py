@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from etc_engine.box import Box
+from etc_engine.packing import PackingSpec, parse_radii
+from etc_engine.realization import (
+    ConductionSpec,
+    ContactSpec,
+    Mixture,
+    RealizationSpec,
+    Status,
+    particle_conductivities,
+    realize,
+)
+
+SPEC = RealizationSpec(
+    PackingSpec("advancing-front", parse_radii("uniform:0.02:0.04"), Box((1.0, 1.0)), density=0.7, radius_growth=False),
+    ContactSpec("bonded", (np.radians(2.5), np.radians(10.0))),
+    ConductionSpec(methods=("chord", "standard")),
+)
+
+
+def run(spec, seed=71):
+    return realize(spec, np.random.default_rng(seed))
+
+
+def test_cells_are_ordered_by_angle_and_method():
+    result = run(SPEC)
+    k = np.array([[cell.conductivity[0, 0] for cell in row] for row in result.cells])
+    assert k.shape == (2, 2)
+    assert (k[1] > k[0]).all()  # wider arcs
+    assert (k[:, 0] > k[:, 1]).all()  # chord above standard
+    assert {cell.status for row in result.cells for cell in row} == {Status.OK}
+    assert result.density == pytest.approx(0.7, abs=0.005)
+    assert result.solid_fraction == pytest.approx(result.density, abs=1e-6)
+
+
+def test_an_angle_does_not_depend_on_the_others():
+    both = run(SPEC)
+    alone = run(replace(SPEC, contacts=replace(SPEC.contacts, contact_angles=(np.radians(10.0),))))
+    np.testing.assert_array_equal(both.cells[1][0].conductivity, alone.cells[0][0].conductivity)
+
+
+def test_the_same_stream_gives_the_same_bits():
+    one, other = run(SPEC), run(SPEC)
+    for a, b in zip(one.cells, other.cells, strict=True):
+        np.testing.assert_array_equal(a[0].conductivity, b[0].conductivity)
+
+
+def test_below_percolation_the_cells_say_so_with_zero():
+    spec = replace(SPEC, packing=replace(SPEC.packing, density=0.3))
+    cell = run(spec).cells[0][0]
+    assert cell.status is Status.NOT_PERCOLATING
+    assert np.diag(cell.conductivity).tolist() == [0.0, 0.0]
+    assert cell.message == "no path of contacts along xy"
+
+
+def test_a_density_out_of_reach_is_a_failed_packing():
+    cell = run(replace(SPEC, packing=replace(SPEC.packing, density=0.95))).cells[1][1]
+    assert cell.status is Status.PACKING_FAILED
+    assert np.isnan(cell.conductivity).all()
+    assert "0.95" in cell.message
+
+
+def test_arcs_that_overlap_are_an_error_with_a_reason():
+    spec = replace(SPEC, contacts=replace(SPEC.contacts, contact_angles=(np.radians(40.0),)))
+    cell = run(spec).cells[0][0]
+    assert cell.status is Status.ERROR
+    assert "overlap" in cell.message
+
+
+def test_a_mixture_is_met_to_the_nearest_particle_and_lies_between_its_materials():
+    mixed = ConductionSpec(mixture=Mixture(10.0, 0.3))
+    values = particle_conductivities(1001, mixed, np.random.default_rng(72))
+    assert np.count_nonzero(values == 10.0) == 300
+    k = [
+        run(replace(SPEC, conduction=ConductionSpec(mixture=mixture))).cells[0][0].conductivity[0, 0]
+        for mixture in (None, Mixture(10.0, 0.0), Mixture(10.0, 0.5), Mixture(10.0, 1.0))
+    ]
+    assert k[0] == k[1] < k[2] < k[3]
+    assert k[3] == pytest.approx(10.0 * k[0], rel=1e-9)
