@@ -53,3 +53,42 @@ def etc_engine(capsys):
         return Done(status, captured.out, captured.err)
 
     return call
+
+
+@pytest.fixture(scope="session")
+def made_sweep():
+    """Builder of the dataset of a sweep whose conductivities are given, not computed.
+
+    ``conduct(density, angle in degrees or None, method, realization)`` is k_xx and k_yy, a pair or one number for
+    both; None is a packing that failed. The solid fraction is ``solid(density)``.
+    """
+    from etc_engine.batch.dataset import assemble
+    from etc_engine.batch.plan import Unit
+    from etc_engine.batch.provenance import attributes, this_run
+    from etc_engine.batch.records import Record
+    from etc_engine.batch.study import parse_study
+    from etc_engine.realization import Cell, Realization, Status
+
+    def cell(value, mean_field: float) -> Cell:
+        if value is None:
+            return Cell(Status.PACKING_FAILED, "made to fail")
+        tensor = np.full((2, 2), np.nan)
+        np.fill_diagonal(tensor, value)
+        status = Status.OK if tensor[0, 0] > 0.0 else Status.NOT_PERCOLATING
+        return Cell(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
+
+    def build(text: str, conduct, solid=lambda density: density, mean_field: float = 0.5):
+        study = parse_study(text)
+        angles = study.contacts.contact_angle or (None,)
+        records = {}
+        for density in study.densities:
+            for r in range(study.statistics.realizations):
+                values = tuple(
+                    tuple(cell(conduct(density, a, m, r), mean_field) for m in study.conduction.methods) for a in angles
+                )
+                result = Realization(100, density, solid(density), 0.01, values)
+                unit = Unit(density, r)
+                records[unit] = Record(unit, result, 0, "here", 0.0, 1.0)
+        return assemble(study, records, attributes(study, text, [this_run("made", 1, "")], ["here"]))
+
+    return build

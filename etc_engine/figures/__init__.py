@@ -1,5 +1,8 @@
-"""Every picture; the only place that imports matplotlib."""
+"""Pictures of packings, fields and results; the only importer of matplotlib (extra ``plot``)."""
 
+from etc_engine.figures.canvas import save
+from etc_engine.figures.comparison import draw_comparison, save_comparison
 from etc_engine.figures.field import save_field
+from etc_engine.figures.packing import save_packing
 
-__all__ = ["save_field"]
+__all__ = ["draw_comparison", "save", "save_comparison", "save_field", "save_packing"]

@@ -1,0 +1,220 @@
+"""``etc-engine compare``: the result of a sweep beside closed-form models and bounds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    import xarray
+
+    from etc_engine.comparison import Fit, Phases
+
+EXIT_BOUND_BROKEN = 3
+COLUMN = 18
+CELL = ("density", "contact_angle", "method")
+
+
+@click.command("compare")
+@click.argument("result", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Figure to write: .png, .pdf or .svg.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
+    """Compare the sweep in RESULT (netCDF) with conductivity models.
+
+    Prints the simulated mean with its confidence half-width beside every model of the study, and constants fitted
+    over the density. Exit status 3 if a rigorous bound is broken, which can happen to overlapping particles only.
+    """
+    from etc_engine.batch.dataset import open_dataset
+    from etc_engine.cli.options import print_json, replacing
+    from etc_engine.comparison import evaluate_models, fit_models, phases
+
+    dataset = open_dataset(result)
+    medium, comparison, fits = phases(dataset), evaluate_models(dataset), fit_models(dataset)
+    if output is not None:
+        from etc_engine.figures import save_comparison
+
+        with replacing(output) as file:
+            save_comparison(comparison, medium, file)
+    if as_json:
+        print_json(_record(result, output, comparison, medium, fits))
+    else:
+        _print_head(result, comparison, medium)
+        _print_table(comparison)
+        _print_notes(comparison, medium)
+        _print_fits(fits)
+        if output is not None:
+            click.echo(f"figure: {output}")
+    if comparison.attrs["bound_broken"]:
+        _tell_broken(comparison)
+        return EXIT_BOUND_BROKEN
+    return 0
+
+
+def _cells(comparison: xarray.Dataset) -> list[tuple[dict[str, Any], xarray.Dataset]]:
+    """Every cell of the sweep with its labels, densities outermost."""
+    dims = [dim for dim in CELL if dim in comparison["conductivity_mean"].dims]
+    indices = itertools.product(*(range(comparison.sizes[dim]) for dim in dims))
+    picked = [dict(zip(dims, index, strict=True)) for index in indices]
+    return [
+        (
+            {
+                dim: comparison[dim].values[i].item() if dim != "method" else str(comparison[dim].values[i])
+                for dim, i in p.items()
+            },
+            comparison.isel(p),
+        )
+        for p in picked
+    ]
+
+
+def _record(
+    result: Path, output: Path | None, comparison: xarray.Dataset, medium: Phases, fits: tuple[Fit, ...]
+) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return {
+        "result": str(result),
+        "figure": None if output is None else str(output),
+        "pore_conductivity": medium.pores,
+        "particle_conductivity": medium.particles,
+        "dimension": medium.dimension,
+        "confidence_level": comparison["half_width"].attrs["confidence_level"],
+        "bounds_bind": bool(comparison.attrs["bounds_bind"]),
+        "bound_broken": bool(comparison.attrs["bound_broken"]),
+        "best_model": comparison.attrs["best_model"] or None,
+        "cells": [_cell_record(labels, cell) for labels, cell in _cells(comparison)],
+        "fits": [asdict(fit) for fit in fits],
+    }
+
+
+def _cell_record(labels: dict[str, Any], cell: xarray.Dataset) -> dict[str, Any]:
+    numbers = ("solid_fraction", "conductivity_mean", "half_width", "conductivity_ci_low", "conductivity_ci_high")
+    return {
+        **labels,
+        **{name: float(cell[name]) for name in numbers},
+        "count": int(cell["count"]),
+        "inside_bounds": bool(cell["inside_bounds"]),
+        "models": {
+            str(name): {
+                "conductivity": float(one["model_conductivity"]),
+                "relative_difference": float(one["relative_difference"]),
+                "kind": str(one["model_kind"].item()),
+                "outside_bound": bool(one["outside_bound"]),
+                "bound_broken": bool(one["bound_broken"]),
+            }
+            for name in cell["model"].values
+            for one in [cell.sel({"model": name})]
+        },
+    }
+
+
+def _print_head(result: Path, comparison: xarray.Dataset, medium: Phases) -> None:
+    level = comparison["half_width"].attrs["confidence_level"]
+    click.echo(f"{result}: particles of {medium.particles:g} W/(m K), pores of {medium.pores:g} W/(m K)")
+    click.echo(
+        "simulation: mean of the tensor's diagonal over n realizations +- half-width of its "
+        f"{100 * level:g} % Student-t interval [W/(m K)]"
+    )
+    click.echo(
+        "models: conductivity [W/(m K)] and relative difference to the simulation; * the simulation lies beyond it"
+    )
+
+
+def _shown(comparison: xarray.Dataset) -> list[str]:
+    """The models that get a column: those with a value other than 0 somewhere."""
+    values = comparison["model_conductivity"]
+    return [str(name) for name in comparison["model"].values if bool((values.sel({"model": name}) > 0.0).any())]
+
+
+def _print_table(comparison: xarray.Dataset) -> None:
+    shown = _shown(comparison)
+    dims = [dim for dim in CELL if dim in comparison["conductivity_mean"].dims]
+    heads = {"density": ["density"], "contact_angle": ["contact", "angle"], "method": ["method"]}
+    columns = [heads[dim] for dim in dims] + [["solid", "fraction"], ["n"]]
+    narrow = [10 if dim == "method" else 9 for dim in dims] + [9, 5]
+    models = [name.split("_") for name in shown]
+    deep = max(map(len, [*columns, *models]))
+    click.echo()
+    for level in range(deep):
+        line = "".join(_word(c, level, deep).rjust(w) for c, w in zip(columns, narrow, strict=True))
+        line += _word(["simulation"], level, deep).rjust(20)
+        click.echo(line + "".join(_word(m, level, deep).rjust(COLUMN) for m in models))
+    for labels, cell in _cells(comparison):
+        words = [value if isinstance(value, str) else f"{value:.4g}" for value in labels.values()]
+        words += [f"{float(cell['solid_fraction']):.4f}", str(int(cell["count"]))]
+        line = "".join(word.rjust(w) for word, w in zip(words, narrow, strict=True))
+        line += f"{_number(float(cell['conductivity_mean']))} +- {_number(float(cell['half_width']))}".rjust(20)
+        click.echo(line + "".join(_model_words(cell.sel({"model": name})).rjust(COLUMN) for name in shown))
+
+
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.4f}"
+
+
+def _word(words: list[str], level: int, deep: int) -> str:
+    """Headings of several words stand on the bottom line of the head."""
+    i = level - (deep - len(words))
+    return words[i] if i >= 0 else ""
+
+
+def _model_words(one: xarray.Dataset) -> str:
+    value, difference = float(one["model_conductivity"]), float(one["relative_difference"])
+    if math.isnan(value):
+        return "-"
+    mark = "*" if bool(one["outside_bound"]) else ""
+    return f"{mark}{value:.4f} " + ("      -" if math.isnan(difference) else f"{100 * difference:+6.1f}%")
+
+
+def _print_notes(comparison: xarray.Dataset, medium: Phases) -> None:
+    click.echo()
+    notes = dict(zip(comparison["model"].values.tolist(), comparison["model_note"].values.tolist(), strict=True))
+    zero = [name for name, note in notes.items() if note.startswith("is 0")]
+    if zero:
+        click.echo(f"0 because the pores insulate: {', '.join(zero)}")
+    for name, note in notes.items():
+        if note and name not in zero:
+            click.echo(f"{name}: {note}")
+    if not medium.overlapping:
+        click.echo("bounds: a comparison only; Hashin-Shtrikman bounds bind overlapping geometries, not bonded ones")
+    elif comparison.attrs["bound_broken"]:
+        click.echo("bounds: they bind overlapping particles, and are broken")
+    else:
+        click.echo("bounds: they bind overlapping particles, and every mean and realization keeps them")
+    best = comparison.attrs["best_model"]
+    if best:
+        rms = comparison["rms_relative_difference"].sel({"model": best})
+        click.echo(
+            f"closest model over the sweep: {best}, rms relative difference {100 * float((rms**2).mean()) ** 0.5:.1f} %"
+        )
+
+
+def _print_fits(fits: tuple[Fit, ...]) -> None:
+    """Fits with constants, one a line; reasons why there is none, once each."""
+    reasons: dict[str, str] = {}
+    for fit in fits:
+        where = ", ".join(f"{key} {value:g}" if key != "method" else str(value) for key, value in fit.selection.items())
+        if not fit.parameters:
+            reasons.setdefault(f"no fit of {fit.model}: {fit.note}", where)
+            continue
+        constants = ", ".join(f"{p.name} {p.value:.4g} [{p.low:.4g}, {p.high:.4g}]" for p in fit.parameters)
+        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {constants}")
+    for reason in reasons:
+        click.echo(reason)
+
+
+def _tell_broken(comparison: xarray.Dataset) -> None:
+    """The first broken bound, on stderr."""
+    for labels, cell in _cells(comparison):
+        where = ", ".join(f"{key} {value}" for key, value in labels.items())
+        for name in cell["model"].values[cell["bound_broken"].values]:
+            bound = float(cell["model_conductivity"].sel({"model": name}))
+            text = f"{where}: {float(cell['conductivity_mean']):.6g} W/(m K) breaks {name} = {bound:.6g}"
+            click.echo(f"etc-engine: a rigorous bound is broken at {text}", err=True)
+            return
+    total = int(comparison["realizations_outside_bounds"].sum())
+    click.echo(f"etc-engine: {total} realizations break the Wiener bounds of their own solid fraction", err=True)

@@ -1,0 +1,257 @@
+"""The main figure: simulated conductivity against density or contact angle, with models as thin lines."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from etc_engine.comparison import model_curve
+from etc_engine.comparison.evaluation import MEAN_FIELD
+from etc_engine.comparison.simulation import Phases
+from etc_engine.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, save, spread, style
+
+if TYPE_CHECKING:
+    import xarray
+
+DECADES = 1.3
+"""A logarithmic axis is used when the simulated values span more than this many decades."""
+
+BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones"
+
+SHORT = {
+    "series": "series",
+    "parallel": "parallel",
+    "hashin_shtrikman_lower": "HS lower",
+    "hashin_shtrikman_upper": "HS upper",
+    "maxwell": "Maxwell",
+    "maxwell_inverse": "inverse Maxwell",
+    "effective_medium": "Bruggeman, symmetric",
+    "differential": "Bruggeman, differential",
+    "differential_inverse": "Bruggeman, pores in solid",
+    "third_order": "third order",
+    "lewis_nielsen": "Lewis-Nielsen",
+    "agari_uno": "Agari-Uno",
+}
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """The horizontal axis: a dimension of the sweep, and the one whose values have a curve each."""
+
+    dim: str
+    label: str
+    curves: str | None
+
+
+def save_comparison(comparison: xarray.Dataset, medium: Phases, path: Path | str) -> None:
+    """Write the figure of a comparison as png, pdf or svg; see `draw_comparison`."""
+    save(draw_comparison(comparison, medium), path)
+
+
+def draw_comparison(comparison: xarray.Dataset, medium: Phases) -> Figure:
+    """Mean conductivity with its confidence band, a curve for each contact angle, and the models.
+
+    Parameters
+    ----------
+    comparison : xarray.Dataset
+        From `etc_engine.comparison.evaluate_models`.
+    medium : Phases
+        The phases behind it, for smooth model lines.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel a method; against the contact angle if the sweep has one density and several angles.
+    """
+    axis = _axis(comparison)
+    panels = _panels(comparison, axis)
+    columns = min(len(panels), 3)
+    rows = -(-len(panels) // columns)
+    figure = new_figure(2.2 + 4.6 * columns, 0.8 + 4.0 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    logarithmic = _is_wide(comparison["conductivity_mean"].values)
+    for axes, (title, part) in zip(grid.flat, panels, strict=False):
+        style(axes)
+        if logarithmic:
+            axes.set_yscale("log")
+        _draw_simulation(axes, part, axis)
+        _draw_models(axes, part, medium, axis)
+        axes.set_title(title, fontsize=9)
+        axes.set_xlabel(axis.label, fontsize=9)
+    if not logarithmic:
+        grid[0, 0].set_ylim(bottom=0.0)
+    for axes in list(grid.flat)[len(panels) :]:
+        axes.set_visible(False)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
+    for row in range(rows):
+        last = min(len(panels), (row + 1) * columns) - 1
+        _label_models(grid.flat[last], panels[last][1], medium, axis)
+    _legend(figure, panels[0][1], axis)
+    figure.supxlabel(_notes(comparison, medium), fontsize=7.5, color="#555555")
+    return figure
+
+
+def _axis(comparison: xarray.Dataset) -> _Axis:
+    angles = comparison.sizes.get("contact_angle", 1)
+    if comparison.sizes["density"] == 1 and angles > 1:
+        return _Axis("contact_angle", "contact half-angle [degree]", None)
+    return _Axis(
+        "density",
+        "density (particle area over box area) [-]",
+        "contact_angle" if "contact_angle" in comparison.dims else None,
+    )
+
+
+def _panels(comparison: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
+    """A title and a part of the comparison for each panel; no dimension is left but the axis and the curves."""
+    if axis.dim == "contact_angle":
+        comparison = comparison.isel(density=0)
+    if "method" not in comparison.dims:
+        return [("", comparison)]
+    return [(f"method {name}", comparison.sel({"method": name})) for name in comparison["method"].values]
+
+
+def _is_wide(values: NDArray[np.float64]) -> bool:
+    positive = values[np.nan_to_num(values) > 0.0]
+    return bool(positive.size and np.log10(positive.max() / positive.min()) > DECADES)
+
+
+def _curves(part: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
+    if axis.curves is None:
+        return [("simulation", part)]
+    return [(f"{angle:g}°", part.sel({axis.curves: angle})) for angle in part[axis.curves].values]
+
+
+def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
+    looks = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
+    for (_, curve), (colour, marker) in zip(_curves(part, axis), looks, strict=False):
+        x = curve[axis.dim].values
+        low, high = curve["conductivity_ci_low"].values, curve["conductivity_ci_high"].values
+        mean = curve["conductivity_mean"].values
+        if axes.get_yscale() == "log":
+            mean, low = np.where(mean > 0.0, mean, np.nan), np.where(low > 0.0, low, 1e-2 * mean)
+        axes.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0.0)
+        if x.size == 1:
+            axes.errorbar(x, mean, [mean - low, high - mean], fmt="none", ecolor=colour, elinewidth=0.9, capsize=3)
+        axes.plot(x, mean, marker=marker, color=colour, markersize=4.5, linewidth=1.6, zorder=3)
+        if MEAN_FIELD in curve["model"].values:
+            field = curve["model_conductivity"].sel({"model": MEAN_FIELD}).values
+            axes.plot(x, field, linestyle=(0, (4, 2)), color=colour, linewidth=0.9, zorder=2)
+
+
+def _fine(part: xarray.Dataset, axis: _Axis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Many points of the horizontal axis, and the solid fraction there."""
+    x, fraction = part[axis.dim].values, part["solid_fraction"].values
+    if axis.dim != "density":
+        return x, np.full(x.size, float(fraction))
+    known = np.isfinite(fraction)
+    if known.sum() < 2:
+        return x, fraction
+    fine = np.linspace(x[known][0], x[known][-1], 60)
+    return fine, np.interp(fine, x[known], fraction[known])
+
+
+def _drawn(part: xarray.Dataset) -> list[str]:
+    """The models that get a line: formulas with a value other than 0 somewhere."""
+    names = [str(name) for name in part["model"].values if name != MEAN_FIELD]
+    values = part["model_conductivity"]
+    return [n for n in names if bool((values.sel({"model": n}) > 0.0).any())]
+
+
+def _lines(
+    part: xarray.Dataset, medium: Phases, axis: _Axis
+) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
+    x, fraction = _fine(part, axis)
+    lines = []
+    for name in _drawn(part):
+        y, _ = model_curve(name, medium, fraction)
+        if np.isfinite(y).sum() < 2:  # its inputs are not those of a formula of the fraction alone
+            values = part["model_conductivity"].sel({"model": name})
+            others = [dim for dim in values.dims if dim != axis.dim]
+            lines.append((name, part[axis.dim].values, values.isel(dict.fromkeys(others, 0)).values))
+        else:
+            lines.append((name, x, y))
+    return lines
+
+
+def _draw_models(axes: Axes, part: xarray.Dataset, medium: Phases, axis: _Axis) -> None:
+    bound = {"hashin_shtrikman_lower", "hashin_shtrikman_upper", "series", "parallel"}
+    for name, x, y in _lines(part, medium, axis):
+        axes.plot(x, y, color=INK if name in bound else GREY, linewidth=0.8, linestyle="-" if name in bound else "-.")
+        if x.size == 1:
+            axes.plot(x, y, marker="_", color=GREY, markersize=14)
+
+
+def _label_models(axes: Axes, part: xarray.Dataset, medium: Phases, axis: _Axis) -> None:
+    """Names at the right ends of the model lines, moved apart where they would overlap."""
+    lines = _lines(part, medium, axis)
+    ends = []
+    for name, x, y in lines:
+        i = int(np.flatnonzero(np.isfinite(y))[-1])
+        ends.append((name, float(x[i]), float(y[i])))
+    if not ends:
+        return
+    axes.set_xlim(axes.get_xlim())  # the labels are placed in these limits
+    axes.set_ylim(axes.get_ylim())
+    to_fraction = axes.transScale + axes.transLimits
+    points = [to_fraction.transform((x, y)) for _, x, y in ends]
+    heights = spread([float(p[1]) for p in points], 0.05, 0.0, 1.0)
+    for (name, _, _), point, height in zip(ends, points, heights, strict=True):
+        axes.annotate(
+            SHORT.get(name, name.replace("_", " ")),
+            xy=(float(point[0]), float(point[1])),
+            xycoords="axes fraction",
+            xytext=(1.03, height),
+            textcoords="axes fraction",
+            fontsize=7.5,
+            color="#444444",
+            va="center",
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": "#bbbbbb", "linewidth": 0.5, "shrinkA": 1, "shrinkB": 0},
+        )
+
+
+def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
+    looks = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
+    handles: list[Any] = []
+    for (label, _), (colour, marker) in zip(_curves(part, axis), looks, strict=False):
+        handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.6, label=label))
+    if MEAN_FIELD in part["model"].values:
+        handles.append(Line2D([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=0.9, label="contact mean field"))
+    title = "contact half-angle" if axis.curves else None
+    columns = min(len(handles), 6)
+    figure.legend(
+        handles=handles,
+        title=title,
+        fontsize=8,
+        title_fontsize=8,
+        frameon=False,
+        loc="outside upper center",
+        ncols=columns,
+    )
+
+
+def _notes(comparison: xarray.Dataset, medium: Phases) -> str:
+    level = comparison["half_width"].attrs["confidence_level"]
+    counts = comparison["count"].values[comparison["count"].values > 0]
+    few, many = (int(counts.min()), int(counts.max())) if counts.size else (0, 0)
+    number = f"{many}" if few == many else f"{few} to {many}"
+    notes = [
+        f"Bands: {100 * level:g} % Student-t interval of the mean of $k_{{xx}}$ and $k_{{yy}}$, {number} realizations."
+    ]
+    zero = [
+        SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
+    ]
+    if zero and medium.pores == 0.0:
+        notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
+    notes.append(f"{BOUNDS_NOTE}.")
+    return "\n".join(notes)
