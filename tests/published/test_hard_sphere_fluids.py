@@ -1,7 +1,8 @@
 """Event-driven dynamics and packings against the literature on hard disks and spheres.
 
 - Contact value of the pair correlation: disks, S. Luding, Phys. Rev. E 63 (2001) 042201,
-  doi:10.1103/PhysRevE.63.042201 (Henderson's 1975 form with a correction for dense fluids); spheres, N. F. Carnahan, K. E. Starling, J. Chem. Phys. 51 (1969) 635-636,
+  doi:10.1103/PhysRevE.63.042201 (Henderson's 1975 form, corrected for dense fluids); spheres,
+  N. F. Carnahan, K. E. Starling, J. Chem. Phys. 51 (1969) 635-636,
   doi:10.1063/1.1672048.
 - Enskog's collision rate per particle, 2 sqrt(pi) n s chi sqrt(kT/m) for disks of diameter s and
   4 sqrt(pi) n s^2 chi sqrt(kT/m) for spheres: S. Chapman, T. G. Cowling, The Mathematical Theory of
