@@ -70,33 +70,96 @@ def pack_advancing_front(radii: RadiusDistribution, box: Box, rng: np.random.Gen
     >>> bool(packing.density > 0.7)
     True
     """
+    sizes = enough_radii(radii, box, rng)
+    centers = _fill_box(sizes, box, rng)
+    return ParticlePacking(centers, sizes[: len(centers)], box)
+
+
+def pack_given_disks(
+    sizes: NDArray[np.float64], spare: RadiusDistribution, box: Box, rng: np.random.Generator
+) -> ParticlePacking:
+    """Pack exactly these disks, spread over the whole box, by the advancing front.
+
+    The box is filled with the given disks and others from the distribution in random order; the others are
+    then taken out, so that vacancies are spread at random.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n,) [m]
+        Radii of the disks.
+    spare : RadiusDistribution
+        Sizes of the disks that hold the places of the vacancies.
+    box : Box
+        Two-dimensional box with walls on all sides.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    ParticlePacking
+        The n disks, in the order in which they were placed.
+
+    Raises
+    ------
+    PackingError
+        If the box, filled to the algorithm's own density, does not hold them all; `reached` is that density.
+    """
+    spares = enough_radii(spare, box, rng)
+    stream = np.concatenate((rng.permutation(sizes), spares))
+    filled = _fill_box(stream, box, rng)
+    own = float(np.pi * np.sum(stream[: len(filled)] ** 2) / box.volume)
+    slots = int(0.99 * len(filled))
+    while slots >= sizes.size:
+        given = np.zeros(sizes.size + spares.size, dtype=np.bool_)
+        given[rng.permutation(slots)[: sizes.size]] = True
+        stream = np.empty(given.size)
+        stream[given], stream[~given] = rng.permutation(sizes), spares
+        centers = _fill_box(stream, box, rng)
+        given[len(centers) :] = False
+        if given.sum() == sizes.size:
+            return ParticlePacking(centers[given[: len(centers)]], stream[given], box)
+        slots = int(0.99 * min(slots, len(centers)))
+    wanted = float(np.pi * np.sum(sizes**2) / box.volume)
+    raise PackingError(
+        f"{sizes.size} disks of total density {wanted:.6g} do not fit: the advancing front fills this box to "
+        f"about {own:.4g}; ask for less, let the radii grow, or use lubachevsky-stillinger",
+        reached=own,
+    )
+
+
+def enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) -> NDArray[np.float64]:
+    """More radii than the box can hold: their full areas (volumes) exceed its own."""
+    d = box.dimension
+    block = int(1.1 * box.volume / radii.mean_measure(d)) + 10
+    sizes = radii.sample(block, rng)
+    while True:
+        filled = np.cumsum(np.pi * sizes**2 if d == 2 else 4.0 / 3.0 * np.pi * sizes**3)
+        if filled[-1] > box.volume:
+            return sizes[: int(np.searchsorted(filled, box.volume)) + 1]
+        sizes = np.concatenate((sizes, radii.sample(block, rng)))
+
+
+def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Centres of as many of the disks, in their order, as the front can place."""
     if box.dimension != 2 or any(box.periodic):
         raise InputError(
             f"the advancing front fills 2D boxes with walls, found {box.dimension}D with periodic axes "
             f"{box.periodic_axes!r}: use lubachevsky-stillinger"
         )
-    sizes = _enough_radii(radii, box, rng)
     if 2.0 * sizes.max() > min(box.lengths):
-        raise InputError(f"a disk of radius {sizes.max():g} is wider than the box {box.lengths}: use smaller radii")
+        raise InputError(
+            f"a disk of radius {sizes.max():g} is wider than the box {box.lengths}: use smaller radii"
+        )
     grids = cell_grids(sizes, box)
     direction = rng.uniform(0.0, 2.0 * np.pi)
-    first = sizes[0] + sizes[1] if sizes.size > 1 else np.inf
-    from_the_middle = 4.0 * first < min(box.lengths)
-    centers = _fill(sizes, grids, direction, from_the_middle, RETRIES, WALL_DEPTH)
+    from_the_middle = sizes.size > 1 and 4.0 * (sizes[0] + sizes[1]) < min(box.lengths)
+    centers: NDArray[np.float64] = _fill(sizes, grids, direction, from_the_middle, RETRIES, WALL_DEPTH)
     if from_the_middle and not _touches_all_walls(centers, sizes, box):
         centers = _fill(sizes, grids, direction, False, RETRIES, WALL_DEPTH)
     if not _touches_all_walls(centers, sizes, box):
-        raise PackingError(f"the box {box.lengths} is too small for these radii: not every wall could be touched")
-    return ParticlePacking(centers, sizes[: len(centers)], box)
-
-
-def _enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) -> NDArray[np.float64]:
-    """More radii than the box can hold: their full areas exceed its area."""
-    block = int(1.1 * box.volume / radii.mean_measure(2)) + 10
-    sizes = radii.sample(block, rng)
-    while np.pi * np.sum(sizes**2) <= box.volume:
-        sizes = np.concatenate((sizes, radii.sample(block, rng)))
-    return sizes[: int(np.searchsorted(np.cumsum(np.pi * sizes**2), box.volume)) + 1]
+        raise PackingError(
+            f"the box {box.lengths} is too small for these radii: not every wall could be touched"
+        )
+    return centers
 
 
 def _touches_all_walls(centers: NDArray[np.float64], sizes: NDArray[np.float64], box: Box) -> bool:
@@ -106,7 +169,7 @@ def _touches_all_walls(centers: NDArray[np.float64], sizes: NDArray[np.float64],
 
 
 @njit(cache=True)
-def _tangent_to_disks(ax, ay, ra, bx, by, rb, r):  # type: ignore[no-untyped-def]
+def _tangent_to_disks(ax, ay, ra, bx, by, rb, r):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """Centre of the disk of radius r tangent to disks a and b, left of a -> b."""
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
@@ -119,7 +182,7 @@ def _tangent_to_disks(ax, ay, ra, bx, by, rb, r):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _tangent_to_wall(ax, ay, ra, wall, outwards, r, lx, ly):  # type: ignore[no-untyped-def]
+def _tangent_to_wall(ax, ay, ra, wall, outwards, r, lx, ly):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """Centre of the disk of radius r tangent to disk a and a wall, left of disk -> wall (or wall -> disk).
 
     Walls are numbered 0: x = 0, 1: x = lx, 2: y = 0, 3: y = ly.
@@ -138,7 +201,7 @@ def _tangent_to_wall(ax, ay, ra, wall, outwards, r, lx, ly):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]
+def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """Centre of the disk of radius r tangent to objects a and b; objects from sizes.size on are walls."""
     wall_a, wall_b = a - sizes.size, b - sizes.size
     if wall_a < 0 and wall_b < 0:
@@ -154,7 +217,7 @@ def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _overlap(j, r, cx, cy, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]
+def _overlap(j, r, cx, cy, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """Depth by which a disk of radius r at (cx, cy) overlaps object j; negative if it does not."""
     if j < sizes.size:
         return r + sizes[j] - np.sqrt((x[j] - cx) ** 2 + (y[j] - cy) ** 2)
@@ -165,12 +228,15 @@ def _overlap(j, r, cx, cy, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # type: ignore[no-untyped-def]
+def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """Collect in `hits` the objects, other than a and b, that a disk of radius r at (cx, cy) overlaps."""
     _, cells, first_cell, largest, lengths, periodic = grids
     count = 0
     for wall in range(sizes.size, sizes.size + 4):
-        if wall not in (a, b) and _overlap(wall, r, cx, cy, x, y, sizes, lengths[0], lengths[1]) > OVERLAP * r:
+        if (
+            wall not in (a, b)
+            and _overlap(wall, r, cx, cy, x, y, sizes, lengths[0], lengths[1]) > OVERLAP * r
+        ):
             hits[count] = wall
             count += 1
     for k in range(largest.size):
@@ -194,7 +260,7 @@ def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # t
 
 
 @njit(cache=True)
-def _first_hit(a, b, r, x, y, sizes, lx, ly, hits, count):  # type: ignore[no-untyped-def]
+def _first_hit(a, b, r, x, y, sizes, lx, ly, hits, count):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """Of the objects hit, the first one met by a disk that grows between a and b up to radius r.
 
     The triangle of a, b and that object is empty: hits make as few edges as a triangulation has.
@@ -230,7 +296,7 @@ def _append(queue, end, a, b, tries):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # type: ignore[no-untyped-def]  # noqa: PLR0915
+def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915, PLR0917
     """Place disks of the given sizes, in their order, until no edge of the front takes the next one.
 
     Edges wait in three places: `pending` (last in, first out) holds the edges to be tried at once with the

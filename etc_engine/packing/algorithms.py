@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from etc_engine.box import Box
-from etc_engine.errors import InputError
-from etc_engine.packing.advancing_front import pack_advancing_front
+from etc_engine.errors import InputError, PackingError
+from etc_engine.packing.advancing_front import enough_radii, pack_advancing_front, pack_given_disks
 from etc_engine.packing.density import set_density
+from etc_engine.packing.lubachevsky_stillinger import compress
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.radii import RadiusDistribution
+from etc_engine.packing.random_sequential import SATURATION, insert_randomly
 
 Progress = Callable[[float], None]
 """Called now and then with the fraction of the work that is done."""
@@ -97,18 +101,96 @@ def pack(spec: PackingSpec, rng: np.random.Generator, progress: Progress | None 
     return METHODS[spec.method](spec, rng, progress)
 
 
+def _scaled_sizes(spec: PackingSpec, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Radii for the count and density of the specification, scaled to meet the density exactly."""
+    count = spec.count
+    if count is None and (spec.density is None or spec.radii.scalable):
+        raise InputError(
+            f"{spec.method} needs a count, or a density and radii with a length (equal:r, uniform:a:b, ...)"
+        )
+    d = spec.box.dimension
+    if count is None:
+        count = max(1, round(cast(float, spec.density) * spec.box.volume / spec.radii.mean_measure(d)))
+    sizes = spec.radii.sample(count, rng)
+    if spec.density is None:
+        return sizes
+    measures = np.pi * sizes**2 if d == 2 else 4.0 / 3.0 * np.pi * sizes**3
+    scale = (spec.density * spec.box.volume / float(measures.sum())) ** (1.0 / d)
+    return np.asarray(sizes * scale)
+
+
 def _advancing_front(spec: PackingSpec, rng: np.random.Generator, _: Progress | None) -> ParticlePacking:
-    if spec.count is not None:
-        raise InputError("the advancing front fills the box: leave out the count, or use lubachevsky-stillinger")
-    if spec.radii.scalable:
-        raise InputError("the advancing front needs a radius: write equal:r")
+    if spec.radii.scalable and (spec.count is None or spec.density is None):
+        raise InputError("the advancing front needs a radius (equal:r), or both a count and a density")
+    if spec.count is not None and spec.density is not None:
+        return _given_disks(spec, rng)
     packing = pack_advancing_front(spec.radii, spec.box, rng)
+    if spec.count is not None:
+        if spec.count > packing.count:
+            raise PackingError(
+                f"{spec.count} disks were asked for and the box holds {packing.count}: "
+                "use a smaller count or radius",
+                reached=packing.density,
+            )
+        return packing.select(np.sort(rng.permutation(packing.count)[: spec.count]))
     if spec.density is None:
         return packing
     return set_density(packing, spec.density, rng, growth_allowed=spec.radius_growth)
 
 
+def _given_disks(spec: PackingSpec, rng: np.random.Generator) -> ParticlePacking:
+    """Exactly `count` disks at exactly `density`, grown into overlap where the front is not so dense."""
+    sizes = _scaled_sizes(spec, rng)
+    factor = 1.0
+    for _ in range(5):
+        spare = RadiusDistribution("list", tuple(sizes * factor))
+        try:
+            packing = pack_given_disks(sizes * factor, spare, spec.box, rng)
+        except PackingError as refusal:
+            if not spec.radius_growth or refusal.reached is None:
+                raise
+            factor *= min(0.98, (0.97 * refusal.reached / (cast(float, spec.density) * factor**2)) ** 0.5)
+            continue
+        return packing.with_radii(packing.radii / factor)
+    raise PackingError(f"{spec.count} disks could not be placed in the box {spec.box.lengths}")
+
+
+def _lubachevsky_stillinger(
+    spec: PackingSpec, rng: np.random.Generator, progress: Progress | None
+) -> ParticlePacking:
+    sizes = _scaled_sizes(spec, rng)
+    return compress(
+        sizes, spec.box, rng, density=spec.density, growth_rate=spec.growth_rate, progress=progress
+    ).packing
+
+
+def _random_sequential(
+    spec: PackingSpec, rng: np.random.Generator, progress: Progress | None
+) -> ParticlePacking:
+    if spec.count is None and spec.density is None and not spec.radii.scalable:
+        return insert_randomly(enough_radii(spec.radii, spec.box, rng), spec.box, rng, progress).packing
+    sizes = np.sort(_scaled_sizes(spec, rng))[::-1]  # the largest first: small ones still find room later
+    saturation = SATURATION[spec.box.dimension]
+    if spec.density is not None and np.ptp(sizes) == 0.0 and spec.density > 1.15 * saturation:
+        raise InputError(
+            f"density {spec.density:g} is out of reach: random sequential insertion of equal particles "
+            f"saturates near {saturation:g}; ask for less, or use lubachevsky-stillinger"
+        )
+    insertion = insert_randomly(sizes, spec.box, rng, progress)
+    packing = insertion.packing
+    if packing.count < sizes.size:
+        raise PackingError(
+            f"random sequential insertion saturated at density {packing.density:.6f} with {packing.count} of "
+            f"{sizes.size} particles; large boxes of equal particles saturate near "
+            f"{saturation:g}: ask for less, or use lubachevsky-stillinger",
+            reached=packing.density,
+        )
+    return packing
+
+
 METHODS: dict[str, Callable[[PackingSpec, np.random.Generator, Progress | None], ParticlePacking]] = {
     "advancing-front": _advancing_front,
+    "lubachevsky-stillinger": _lubachevsky_stillinger,
+    "random-sequential": _random_sequential,
 }
 """Packing methods by their words."""

@@ -31,7 +31,8 @@ def bench_advancing_front(largest: int) -> None:
         seconds.append(packed - start)
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
-            f"{packing.count:9d} {packing.density:8.4f} {2 * contacts / packing.count:7.4f} {packed - start:8.3f} "
+            f"{packing.count:9d} {packing.density:8.4f} {2 * contacts / packing.count:7.4f} "
+            f"{packed - start:8.3f} "
             f"{searched - packed:8.3f} {1e6 * seconds[-1] / packing.count:8.3f} {peak:8.0f}"
         )
     if len(counts) > 1:
