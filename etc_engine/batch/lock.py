@@ -76,7 +76,7 @@ class Lock:
     def __enter__(self) -> Lock:
         while not self._create():
             found = read_holder(self.path)
-            reason = alive(self.path, found, self.holder)
+            reason = alive(self.path, found, self.holder) if found or self.path.exists() else ""
             if reason:
                 raise OutputError(f"another run is computing this output ({reason}): wait for it, or end it first")
             self._move_away(found)
@@ -99,6 +99,9 @@ class Lock:
             draft.write_text(json.dumps(asdict(self.holder)))
             os.link(draft, self.path)
         except FileExistsError:
+            return False
+        except FileNotFoundError:
+            self.path.parent.mkdir(exist_ok=True)  # the run before us has just removed its empty folder
             return False
         except OSError as error:
             raise OutputError(f"cannot write lock {self.path}: {error.strerror}") from None
@@ -141,7 +144,7 @@ def read_holder(path: Path) -> Holder | None:
 
 def alive(path: Path, holder: Holder | None, me: Holder) -> str:
     """Why the holder of a lock counts as alive, in words; empty if the lock is stale."""
-    silent = _seconds_since_touched(path)
+    silent = seconds_since_touched(path)
     if silent is None:
         return ""
     if holder is None:
@@ -157,7 +160,7 @@ def alive(path: Path, holder: Holder | None, me: Holder) -> str:
     return f"{who} gave a sign of life {silent:.0f} s ago; after {SILENCE:.0f} s without one it counts as dead"
 
 
-def _seconds_since_touched(path: Path) -> float | None:
+def seconds_since_touched(path: Path) -> float | None:
     """Age of a lock on the clock of its file system; None if it is gone."""
     probe = path.with_name(f".clock.{os.getpid()}.{time.monotonic_ns()}.tmp")
     try:

@@ -45,6 +45,8 @@ realizations = 6
 relative_ci = 0.03
 max_realizations = 24
 """
+UNITS = 60
+"""About as many units the study needs, for the choice of moments."""
 
 
 @dataclass
@@ -57,6 +59,7 @@ class Tally:
     changed: int = 0
     again: int = 0
     completed: int = 0
+    refused: int = 0
     kinds: Counter[str] = field(default_factory=Counter)
 
     def __str__(self) -> str:
@@ -64,27 +67,35 @@ class Tally:
         return (
             f"kills {self.kills} ({kinds}); landed mid-run {self.landed}; units lost {self.lost}; "
             f"units changed {self.changed}; sweeps completed {self.completed}; "
-            f"units computed again because they had no record yet {self.again}"
+            f"units computed again because they had no record yet {self.again}; "
+            f"starts refused because orphans held the lock {self.refused}"
         )
 
 
-def kill_sweeps(folder: Path, kills: int, ranks: int, seed: int, unit_seconds: float = 0.04) -> Tally:
+def kill_sweeps(folder: Path, kills: int, ranks: int, seed: int, unit_seconds: float = 0.08) -> Tally:
     """Kill sweeps until so many kills have been made, then let the last one finish."""
     rng = np.random.Generator(np.random.PCG64(seed))
     study, reference = folder / "study.toml", folder / "reference.nc"
     study.write_text(STUDY)
-    subprocess.run([sys.executable, str(STAND_IN), str(study), "-o", str(reference)], check=True)
     tally, sweep = Tally(), _Sweep(folder, ranks, unit_seconds)
+    began = time.monotonic()
+    subprocess.run([*sweep.launcher, str(STAND_IN), str(study), "-o", str(reference)], check=True)
+    start = time.monotonic() - began  # its units take no time
+    compute = 2 * UNITS * unit_seconds / ranks
     while tally.kills < kills:
         kind = KINDS[int(rng.integers(len(KINDS)))]
-        alive = sweep.start_and_strike(kind, float(rng.uniform(0.2, 0.6 + 60 * unit_seconds / ranks)), rng)
+        before = sweep.computed()
+        alive = sweep.start_and_strike(kind, float(rng.uniform(0.5 * start, start + 0.5 * compute)), rng)
         if alive:
             tally.kills += 1
             tally.kinds[kind.__name__.strip("_")] += 1
-            tally.landed += sweep.mid_run()
+            tally.landed += sweep.computed() > before and not sweep.output.exists()
         sweep.check(tally, reference)
-    sweep.start_and_strike(None, 0.0, rng)
-    sweep.check(tally, reference)
+    finished = tally.completed
+    while tally.completed == finished:
+        sweep.start_and_strike(None, 0.0, rng)
+        sweep.check(tally, reference)
+    tally.refused = sweep.refused
     return tally
 
 
@@ -92,19 +103,18 @@ class _Sweep:
     """One output that is computed in many attempts."""
 
     def __init__(self, folder: Path, ranks: int, unit_seconds: float) -> None:
-        self.folder, self.ranks, self.unit_seconds = folder, ranks, unit_seconds
+        self.folder, self.unit_seconds = folder, unit_seconds
+        self.launcher = [str(MPIEXEC), "-n", str(ranks)] * (ranks > 1) + [sys.executable]
         self.output, self.log = folder / "out.nc", folder / "log"
         self.known: dict[Unit, bytes] = {}
-        self.errors = ""
+        self.refused = 0
 
     def start_and_strike(
         self, kind: Callable[[_Sweep, int, np.random.Generator], None] | None, delay: float, rng: np.random.Generator
     ) -> bool:
         """Start or go on; strike after a delay. Answers whether the sweep was alive then."""
-        command = [sys.executable, str(STAND_IN), str(self.folder / "study.toml"), "-o", str(self.output)]
+        command = [*self.launcher, str(STAND_IN), str(self.folder / "study.toml"), "-o", str(self.output)]
         command += ["--policy", "resume", "--seconds", str(self.unit_seconds), "--log", str(self.log)]
-        if self.ranks > 1:
-            command = [str(MPIEXEC), "-n", str(self.ranks), *command]
         with (self.folder / "errors").open("w") as errors:
             running = subprocess.Popen(command, stderr=errors, stdout=subprocess.DEVNULL)
         if kind is None:
@@ -116,11 +126,15 @@ class _Sweep:
                 family = descendants(running.pid)
                 kind(self, running.pid, rng)
                 running.wait(timeout=60)
-                wait_for_end(family)
+                if kind is not _launcher:  # its orphans are met by the next attempt
+                    wait_for_end(family)
                 return True
-        self.errors = (self.folder / "errors").read_text()
-        if running.returncode not in (0, 75):
-            raise RuntimeError(f"the sweep ended with status {running.returncode}: {self.errors}")
+        errors_text = (self.folder / "errors").read_text()
+        if running.returncode == 2 and "another run is computing" in errors_text:
+            self.refused += 1
+            time.sleep(0.1)
+        elif running.returncode not in (0, 75):
+            raise RuntimeError(f"the sweep ended with status {running.returncode}: {errors_text}")
         return False
 
     def records(self) -> dict[Unit, bytes]:
@@ -131,9 +145,9 @@ class _Sweep:
             for unit, record in found.items()
         }
 
-    def mid_run(self) -> bool:
-        """Whether the last attempt had begun to compute and had not ended."""
-        return not self.output.exists() and self.log.exists() and bool(self.log.read_text())
+    def computed(self) -> int:
+        """Units computed since the sweep was begun, by all attempts."""
+        return len(self.log.read_text().splitlines()) if self.log.exists() else 0
 
     def check(self, tally: Tally, reference: Path) -> None:
         """Count what is gone or different since the last look."""
@@ -142,7 +156,7 @@ class _Sweep:
             if differing_variables(whole, mended):
                 same = (whole["conductivity"] == mended["conductivity"]) | whole["conductivity"].isnull()
                 tally.changed += max(1, int((~same.all(("contact_angle", "direction_i", "direction_j"))).sum()))
-            tally.again += len(self.log.read_text().splitlines()) - int((whole["worker_rank"] >= 0).sum())
+            tally.again += self.computed() - int((whole["worker_rank"] >= 0).sum())
             tally.completed += 1
             self.begin_anew()
             return
