@@ -210,8 +210,8 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
     try:
         with ShardWriter(claim.folder, round_.shard, communicator.rank) as shard:
             while (index := communicator.add(NEXT, 1) - round_.base) < len(units):
-                work = partial(_run_unit, claim.study, specs, units[index], communicator.rank, realize)
-                record = stop.run(work)
+                unit = units[index]
+                record = stop.run(partial(run_unit, claim.study, specs[unit.density], unit, communicator.rank, realize))
                 shard.append(record)
                 communicator.add(DONE, 1)
                 communicator.add(FAILED, record.failed)
@@ -224,15 +224,9 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
     return stop.reason
 
 
-def _run_unit(
-    study: Study,
-    specs: Mapping[float | None, RealizationSpec],
-    unit: Unit,
-    rank: int,
-    realize: Realize,
-) -> Record:
+def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize: Realize) -> Record:
     """One realization; what it raises becomes its result."""
-    spec, started = specs[unit.density], time.time()
+    started = time.time()
     try:
         result = realize(spec, unit_rng(study.seed, unit))
     except Exception as error:

@@ -97,11 +97,11 @@ def test_an_error_of_the_program_on_one_rank_ends_all(study, tmp_path, guilty):
     code = (
         "import sys, pathlib\nimport etc_engine.batch.sweep as s\nfrom etc_engine.cli.sweep import launch\n"
         f"exec(open({str(STAND_IN)!r}).read().split('def main')[0])\n"
-        "run = s._run_unit\n"
-        "def broken(study, specs, unit, rank, realize):\n"
+        "run = s.run_unit\n"
+        "def broken(study, spec, unit, rank, realize):\n"
         f"    if rank == {guilty}: raise MemoryError('no room')\n"
-        "    wait(0.2, False)\n    return run(study, specs, unit, rank, realize)\n"
-        "s._run_unit = broken\n"
+        "    wait(0.2, False)\n    return run(study, spec, unit, rank, realize)\n"
+        "s.run_unit = broken\n"
         "launch(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), 'fresh', realize)\n"
     )
     done = ranks(2, "-c", code, str(study), str(tmp_path / "out.nc"), timeout=60)
