@@ -41,11 +41,11 @@ density = [0.60, 0.65, 0.70, 0.75]
 rule = "bonded"
 contact_angle = [2.5, 5.0]
 [statistics]
-realizations = 6
-relative_ci = 0.03
-max_realizations = 24
+realizations = 4
+relative_ci = 0.04
+max_realizations = 16
 """
-UNITS = 60
+UNITS = 40
 """About as many units the study needs, for the choice of moments."""
 
 
