@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -66,7 +67,7 @@ def wait(seconds: float, burn: bool) -> None:
         pass
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """The command line of the stand-in."""
     parser = argparse.ArgumentParser()
     parser.add_argument("study", type=Path)
@@ -77,7 +78,7 @@ def main() -> int:
     parser.add_argument("--log", type=Path, help="write a line for every unit computed")
     parser.add_argument("--trouble", action="store_true", help="some units and cells fail")
     parser.add_argument("--file-limit", type=int, help="no file may grow beyond so many bytes, as on a full disk")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     hold_one_thread()
     if options.file_limit:
         import resource

@@ -15,6 +15,7 @@ from etc_engine.batch.lock import Lock
 from etc_engine.batch.provenance import Run, engine_commit, engine_version, this_run
 from etc_engine.batch.shards import (
     SUFFIX,
+    clear_folder,
     read_study_file,
     shard_folder,
     write_atomically,
@@ -83,7 +84,7 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
         _refuse_other_study(study, *found, str(folder))
         remarks = _other_engines(folder)
     else:
-        _clear(folder)
+        clear_folder(folder)
         write_study_file(folder, study.identity(), study.digest())
     for leftover in output.parent.glob(f".{output.name}.*.tmp"):  # of a run killed while it wrote the output
         leftover.unlink(missing_ok=True)
@@ -136,16 +137,9 @@ def _make_folder(output: Path) -> Path:
 
 
 def _remove_if_empty(folder: Path) -> None:
-    """A refused run leaves nothing behind."""
+    """Neither a refused nor a completed run leaves a folder behind."""
     with suppress(OSError):
         folder.rmdir()
-
-
-def _clear(folder: Path) -> None:
-    """Remove what an earlier sweep left, but for the lock."""
-    for pattern in (f"*{SUFFIX}", "*.run", "study.json", ".*.tmp"):
-        for path in folder.glob(pattern):
-            path.unlink(missing_ok=True)
 
 
 def _study_of_output(output: Path) -> tuple[str, dict[str, Any]]:

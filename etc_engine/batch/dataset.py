@@ -265,18 +265,19 @@ def differing_variables(one: xarray.Dataset, other: xarray.Dataset) -> list[str]
     and attributes are left out.
     """
     names = sorted({str(name) for name in (*one.variables, *other.variables)})
-    return [name for name in names if not name.endswith(INCIDENTAL) and not _same_bits(one, other, name)]
+    return [name for name in names if not name.endswith(INCIDENTAL) and not same_bits(one, other, name)]
 
 
-def _same_bits(one: xarray.Dataset, other: xarray.Dataset, name: str) -> bool:
+def same_bits(one: xarray.Dataset, other: xarray.Dataset, name: str) -> bool:
+    """Whether a variable has the same bits in two datasets."""
     if name not in one.variables or name not in other.variables:
         return False
     a, b = one[name].values, other[name].values
-    if a.shape != b.shape or a.dtype.kind != b.dtype.kind:
+    if a.shape != b.shape:
         return False
-    if a.dtype.kind in "OU":
-        return bool((a == b).all())
-    return a.dtype == b.dtype and a.tobytes() == b.tobytes()
+    if a.dtype.kind not in "biuf":  # words, in whatever way they are held
+        return bool(a.ravel().tolist() == b.ravel().tolist())
+    return bool(a.dtype == b.dtype and a.tobytes() == b.tobytes())
 
 
 def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:

@@ -74,12 +74,11 @@ class Lock:
         self._heart = threading.Thread(target=self._beat, name="lock", daemon=True)
 
     def __enter__(self) -> Lock:
-        while not self._create():
-            found = read_holder(self.path)
-            reason = alive(self.path, found, self.holder)
+        while not self._create(self.path):
+            reason = alive(self.path, read_holder(self.path), self.holder)
             if reason:
                 raise OutputError(f"another run is computing this output ({reason}): wait for it, or end it first")
-            self._move_away(found)
+            self._remove_stale()
         self._heart.start()
         return self
 
@@ -92,30 +91,37 @@ class Lock:
         if held_by(self.path, self.holder.run):
             self.path.unlink(missing_ok=True)
 
-    def _create(self) -> bool:
-        """Put the lock in place with its content, unless there is one: a link is atomic, also on NFS."""
-        draft = self.path.with_name(f".lock.{self.holder.run}.tmp")
+    def _create(self, path: Path) -> bool:
+        """Put a lock in place with its content, unless there is one: a link is atomic, also on NFS."""
+        draft = path.with_name(f".{path.name}.{self.holder.run}.tmp")
         try:
             draft.write_text(json.dumps(asdict(self.holder)))
-            os.link(draft, self.path)
+            os.link(draft, path)
         except FileExistsError:
             return False
+        except FileNotFoundError:
+            path.parent.mkdir(exist_ok=True)  # the run before us has just removed its empty folder
+            return False
         except OSError as error:
-            raise OutputError(f"cannot write lock {self.path}: {error.strerror}") from None
+            raise OutputError(f"cannot write lock {path}: {error.strerror}") from None
         finally:
             draft.unlink(missing_ok=True)
         return True
 
-    def _move_away(self, stale: Holder | None) -> None:
-        """Remove a stale lock; if another run replaced it in between, put that one back."""
-        aside = self.path.with_name(f".lock.{self.holder.run}.stale")
-        try:
-            self.path.rename(aside)
-        except FileNotFoundError:
+    def _remove_stale(self) -> None:
+        """Remove a stale lock, one run at a time: what is stale on a second look under the bolt stays so."""
+        bolt = self.path.with_name("bolt")
+        if not self._create(bolt):
+            time.sleep(0.02)
+            silent = seconds_since_touched(bolt)
+            if silent is not None and silent > SILENCE:  # whoever set it died within microseconds of that
+                bolt.unlink(missing_ok=True)
             return
-        if read_holder(aside) != stale and not self.path.exists():
-            os.link(aside, self.path)
-        aside.unlink()
+        try:
+            if self.path.exists() and not alive(self.path, read_holder(self.path), self.holder):
+                self.path.unlink(missing_ok=True)
+        finally:
+            bolt.unlink(missing_ok=True)
 
     def _beat(self) -> None:
         while not self._ended.wait(BEAT):
@@ -140,12 +146,12 @@ def read_holder(path: Path) -> Holder | None:
 
 
 def alive(path: Path, holder: Holder | None, me: Holder) -> str:
-    """Why the holder of a lock counts as alive, in words; empty if the lock is stale."""
-    silent = _seconds_since_touched(path)
+    """Why the holder of a lock counts as alive, in words; empty if the lock is stale or gone."""
+    silent = seconds_since_touched(path)
     if silent is None:
         return ""
     if holder is None:
-        return "" if silent > SILENCE else f"its lock {path} cannot be read"
+        return "" if silent > SILENCE or not path.exists() else f"its lock {path} cannot be read"
     who = f"process {holder.process} on {holder.host}"
     if holder.job and holder.job == me.job and holder.restarts < me.restarts:
         return ""
@@ -157,7 +163,7 @@ def alive(path: Path, holder: Holder | None, me: Holder) -> str:
     return f"{who} gave a sign of life {silent:.0f} s ago; after {SILENCE:.0f} s without one it counts as dead"
 
 
-def _seconds_since_touched(path: Path) -> float | None:
+def seconds_since_touched(path: Path) -> float | None:
     """Age of a lock on the clock of its file system; None if it is gone."""
     probe = path.with_name(f".clock.{os.getpid()}.{time.monotonic_ns()}.tmp")
     try:

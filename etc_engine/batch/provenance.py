@@ -16,6 +16,8 @@ from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import etc_engine
 from etc_engine.batch.study import Study
 
@@ -38,7 +40,15 @@ class Run:
 
 def this_run(run: str, ranks: int, job: str) -> Run:
     """The description of the running process as a run."""
-    return Run(run, now(), shlex.join(sys.argv), socket.gethostname(), ranks, job, engine_version(), engine_commit())
+    return Run(run, now(), command_line(), socket.gethostname(), ranks, job, engine_version(), engine_commit())
+
+
+def command_line() -> str:
+    """The command that started this process, to be typed again."""
+    program, *arguments = sys.argv
+    if Path(program).name in ("etc-engine", "__main__.py"):
+        program = "etc-engine"
+    return shlex.join([program, *arguments])
 
 
 def now() -> str:
@@ -57,7 +67,7 @@ def attributes(study: Study, text: str, runs: Sequence[Run], hosts: Sequence[str
         "study": text,
         "study_resolved": json.dumps(study.resolved()),
         "study_digest": study.digest(),
-        "seed": np_int64(study.seed),
+        "seed": np.int64(study.seed),
         "confidence_level": study.statistics.confidence,
         "versions": json.dumps(versions()),
         "commit": runs[-1].commit,
@@ -67,13 +77,6 @@ def attributes(study: Study, text: str, runs: Sequence[Run], hosts: Sequence[str
         "started": runs[0].started,
         "ended": ended,
     }
-
-
-def np_int64(value: int) -> Any:
-    """A netCDF attribute of 64 bits."""
-    import numpy as np
-
-    return np.int64(value)
 
 
 def versions() -> dict[str, str]:

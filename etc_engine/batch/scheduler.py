@@ -31,6 +31,8 @@ STOP = 1 << 48
 """Added to the counter, this ends the work of every rank at its next unit."""
 
 POLL_SECONDS = 0.005
+ABORT_SECONDS = 0.5
+"""Time for the launcher to pass on the last words of a rank before it ends all."""
 
 
 class Communicator(Protocol):
@@ -151,6 +153,7 @@ class World:
     def abort(self, status: int) -> NoReturn:
         """MPI_Abort: without it the other ranks would wait for this one for ever."""
         sys.stderr.flush()
+        time.sleep(ABORT_SECONDS)
         self._comm.Abort(status)
         sys.exit(status)
 

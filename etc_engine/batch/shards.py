@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import time
 import zlib
 from collections.abc import Iterator
@@ -205,6 +204,8 @@ def read_study_file(folder: Path) -> tuple[str, dict[str, Any]] | None:
     return values["digest"], values["study"]
 
 
-def remove_folder(folder: Path) -> None:
-    """Take the shards away once their dataset is in place."""
-    shutil.rmtree(folder, ignore_errors=True)
+def clear_folder(folder: Path) -> None:
+    """Remove everything but the lock, which its holder gives back last: a new run waits for that."""
+    for path in folder.iterdir():
+        if path.name != "lock":
+            path.unlink(missing_ok=True)

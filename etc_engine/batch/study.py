@@ -24,6 +24,8 @@ from pydantic_core import ErrorDetails
 
 from etc_engine.box import Box, parse_periodic
 from etc_engine.errors import InputError, StudyError
+from etc_engine.models.catalogue import find_model
+from etc_engine.packing import METHODS as PACKING_METHODS
 from etc_engine.packing import PackingSpec, RadiusDistribution, parse_radii
 from etc_engine.realization import ENGINES, ConductionSpec, ContactSpec, Mixture, RealizationSpec
 
@@ -92,7 +94,13 @@ class PackingTable(_Table):
             parse_periodic(self.periodic, len(self.box))
         except InputError as error:
             raise ValueError(f"periodic: {error}") from None
-        _parse_radii(self.radii)
+        radii = _parse_radii(self.radii)
+        if self.method not in PACKING_METHODS:
+            raise ValueError(f"method {self.method!r} is not available, allowed: {', '.join(PACKING_METHODS)}")
+        if self.method == "advancing-front" and self.count is not None:
+            raise ValueError("count has no meaning with method = 'advancing-front', which fills the box")
+        if self.method == "advancing-front" and radii.scalable:
+            raise ValueError(f"radii: found {self.radii!r}, 'advancing-front' needs a radius, such as 'equal:0.01'")
         if self.growth_rate is not None and self.method != "lubachevsky-stillinger":
             raise ValueError(f"growth_rate has no meaning with method = {self.method!r}, take it out")
         return self
@@ -201,6 +209,15 @@ class ModelsTable(_Table):
     pore_conductivity: Annotated[float, Field(strict=True, ge=0.0, allow_inf_nan=False)] = Field(
         default=0.0, description="a number of at least 0 [W/(m K)]"
     )
+
+    @model_validator(mode="after")
+    def _check(self) -> ModelsTable:
+        for name in self.names:
+            try:
+                find_model(name)
+            except InputError as error:
+                raise ValueError(f"names: {error}") from None
+        return self
 
 
 class Study(_Table):

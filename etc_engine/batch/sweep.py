@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from etc_engine.batch import provenance
 from etc_engine.batch.claim import Claim, Policy, claim_output, recorded_runs
 from etc_engine.batch.dataset import assemble, open_dataset, write_dataset
-from etc_engine.batch.lock import held_by
 from etc_engine.batch.plan import Unit, next_targets, unit_rng, units_to_run
 from etc_engine.batch.records import Record, failed_realization
 from etc_engine.batch.scheduler import STOP, Communicator
-from etc_engine.batch.shards import ShardReader, ShardWriter, remove_folder
+from etc_engine.batch.shards import ShardReader, ShardWriter, clear_folder
 from etc_engine.batch.stop import Stopped, StopRequest
 from etc_engine.batch.study import Study
+from etc_engine.batch.watch import Watch
 from etc_engine.errors import EtcError, OutputError
 from etc_engine.realization import Realization, RealizationSpec, Status
 
@@ -43,7 +43,6 @@ Notify = Callable[[str], None]
 """Called on rank 0 with a remark."""
 
 NEXT, DONE, FAILED = 0, 1, 2
-LOCK_CHECK_SECONDS = 5.0
 VISIBLE_SECONDS = 60.0
 """How long a network file system may take to show rank 0 what other ranks have written."""
 
@@ -109,22 +108,44 @@ def sweep(
         claim = on_rank_zero(communicator, partial(claim_output, study_path, output, policy, communicator.size, held))
         if claim.complete:
             return on_rank_zero(communicator, partial(_outcome_of_file, claim))
-        reader, computed = ShardReader(claim.folder), 0
-        targets = dict.fromkeys(claim.study.densities, claim.study.statistics.realizations)
-        for number in count():
-            plan = on_rank_zero(communicator, partial(_plan_round, claim, reader, targets, computed))
-            if number == 0 and communicator.rank == 0:
-                _notify_start(claim, plan, reader, notify)
-            if not plan.units:
-                break
-            base = computed + number * communicator.size
-            round_ = _Round(claim, plan, base, f"{claim.run}-{number}", report)
-            stopped = _run_round(round_, communicator, realize, stop)
-            if stopped:
-                return Outcome(output, plan.planned, communicator.add(DONE, 0), stopped=stopped)
-            on_rank_zero(communicator, partial(_await_units, reader, plan.units))
-            targets, computed = plan.targets, computed + len(plan.units)
+        reader = ShardReader(claim.folder)
+        with Watch(claim.folder / "lock", claim.run, launched=communicator.size > 1):
+            computed, stopped = _run_rounds(claim, reader, communicator, realize, stop, report, notify)
+        communicator.wait_for_all(_silent)  # nobody watches the lock any more, rank 0 may give it back
+        if stopped:
+            return Outcome(output, 0, computed, stopped=stopped)
         return on_rank_zero(communicator, partial(_finish, claim, reader, computed))
+
+
+def _run_rounds(
+    claim: Claim,
+    reader: ShardReader,
+    communicator: Communicator,
+    realize: Realize,
+    stop: StopRequest,
+    report: Report,
+    notify: Notify,
+) -> tuple[int, str]:
+    """Compute round after round until every cell is settled.
+
+    Answers how many units all ranks have computed, and why they stopped if they stopped early.
+    """
+    computed = 0
+    targets = dict.fromkeys(claim.study.densities, claim.study.statistics.realizations)
+    for number in count():
+        plan = on_rank_zero(communicator, partial(_plan_round, claim, reader, targets, computed))
+        if number == 0 and communicator.rank == 0:
+            _notify_start(claim, plan, reader, notify)
+        if not plan.units:
+            break
+        base = computed + number * communicator.size
+        round_ = _Round(claim, plan, base, f"{claim.run}-{number}", report)
+        stopped = _run_round(round_, communicator, realize, stop)
+        if stopped:
+            return communicator.add(DONE, 0), stopped
+        on_rank_zero(communicator, partial(_await_units, reader, plan.units))
+        targets, computed = plan.targets, computed + len(plan.units)
+    return computed, ""
 
 
 @dataclass(frozen=True)
@@ -184,17 +205,13 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
 
     Every rank takes one number beyond the last unit: the next round's base allows for it.
     """
-    claim, units, checked = round_.claim, round_.plan.units, time.monotonic()
+    claim, units = round_.claim, round_.plan.units
     specs = {density: claim.study.realization_spec(density) for density in claim.study.densities}
     try:
         with ShardWriter(claim.folder, round_.shard, communicator.rank) as shard:
             while (index := communicator.add(NEXT, 1) - round_.base) < len(units):
-                work = partial(_run_unit, claim.study, specs, units[index], communicator.rank, realize)
-                record = stop.run(work)
-                if time.monotonic() - checked > LOCK_CHECK_SECONDS:
-                    checked = time.monotonic()
-                    if not held_by(claim.folder / "lock", claim.run):
-                        raise OutputError(f"the lock of {claim.output} was taken over by another run")
+                unit = units[index]
+                record = stop.run(partial(run_unit, claim.study, specs[unit.density], unit, communicator.rank, realize))
                 shard.append(record)
                 communicator.add(DONE, 1)
                 communicator.add(FAILED, record.failed)
@@ -207,15 +224,9 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
     return stop.reason
 
 
-def _run_unit(
-    study: Study,
-    specs: Mapping[float | None, RealizationSpec],
-    unit: Unit,
-    rank: int,
-    realize: Realize,
-) -> Record:
+def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize: Realize) -> Record:
     """One realization; what it raises becomes its result."""
-    spec, started = specs[unit.density], time.time()
+    started = time.time()
     try:
         result = realize(spec, unit_rng(study.seed, unit))
     except Exception as error:
@@ -247,7 +258,7 @@ def _finish(claim: Claim, reader: ShardReader, computed: int) -> Outcome:
         write_dataset(dataset, claim.output)
     except OutputError as error:
         return replace(outcome, stopped=str(error))
-    remove_folder(claim.folder)
+    clear_folder(claim.folder)
     return outcome
 
 

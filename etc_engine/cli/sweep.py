@@ -24,7 +24,8 @@ EXIT_RESUMABLE = 75
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="netCDF file to write.")
 @click.option("--resume", is_flag=True, help="Go on where an earlier run stopped; starts anew if there is none.")
 @click.option("--overwrite", is_flag=True, help="Start anew and replace what is there.")
-def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool) -> int:
+@click.option("--dry-run", is_flag=True, help="Print units, time and memory, and what is there; write nothing.")
+def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_run: bool) -> int:
     """Run all realizations of STUDY (a TOML file) and write one dataset.
 
     Under mpirun every rank computes; the result has the same bits for any number of ranks. Finished units
@@ -33,16 +34,20 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool) -> i
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")
-    return launch(study, output, "resume" if resume else "overwrite" if overwrite else "fresh")
+    policy: Policy = "resume" if resume else "overwrite" if overwrite else "fresh"
+    return launch(study, output, policy, dry_run=dry_run)
 
 
-def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = None) -> int:
+def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = None, dry_run: bool = False) -> int:
     """Run a sweep on the ranks that were started; answers the exit status. ``realize`` may be a stand-in."""
+    from etc_engine import realization
     from etc_engine.batch.scheduler import connect
 
     communicator = connect()
     try:
-        return _run(study, output, policy, communicator, realize)
+        if dry_run:
+            return _foretell(study, output, communicator, realize or realization.realize)
+        return _run(study, output, policy, communicator, realize or realization.realize)
     except EtcError:
         if communicator.rank == 0:
             raise
@@ -55,8 +60,7 @@ def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = 
         communicator.abort(1)
 
 
-def _run(study: Path, output: Path, policy: Policy, communicator: Communicator, realize: Realize | None) -> int:
-    from etc_engine import realization
+def _run(study: Path, output: Path, policy: Policy, communicator: Communicator, realize: Realize) -> int:
     from etc_engine.batch.sweep import sweep
     from etc_engine.cli.progress import Progress
 
@@ -67,7 +71,7 @@ def _run(study: Path, output: Path, policy: Policy, communicator: Communicator, 
             output,
             policy,
             communicator,
-            realize or realization.realize,
+            realize,
             report=progress.report,
             notify=progress.notify,
         )
@@ -95,3 +99,32 @@ def _tell(outcome: Outcome, seconds: float, ranks: int) -> None:
     )
     if outcome.failed:
         click.echo(f"etc-engine: {outcome.failed} cells have no conductivity, see `message` in the file", err=True)
+
+
+def _foretell(study: Path, output: Path, communicator: Communicator, realize: Realize) -> int:
+    """Print the forecast of a sweep; rank 0 probes, the others wait."""
+    from functools import partial
+
+    from etc_engine.batch.forecast import forecast
+    from etc_engine.batch.sweep import on_rank_zero
+
+    found = on_rank_zero(communicator, partial(forecast, study, output, communicator.size, realize))
+    communicator.close()
+    if communicator.rank > 0:
+        return 0
+    costly, cheap = found.unit_seconds
+    left = found.units - found.finished
+    click.echo(f"units     {found.units} with {found.cells} cells, {found.finished} of them finished")
+    if found.most_units > found.units:
+        click.echo(f"          adaptive: at most {found.most_units} units")
+    click.echo(f"found     {found.state}")
+    click.echo(f"unit      {costly:.3g} s (densest), {cheap:.3g} s (thinnest), by a probe of each")
+    click.echo(f"warm-up   {found.first_seconds:.3g} s")
+    click.echo(f"time      about {found.seconds(left):.3g} s on {found.ranks} rank{'s' * (found.ranks > 1)}")
+    if found.most_units > found.units:
+        click.echo(f"          at most about {found.seconds(found.most_units - found.finished):.3g} s")
+    click.echo(f"memory    {found.rank_bytes / 1e6:.0f} MB a rank")
+    click.echo(f"disk      {found.shard_bytes / 1e6:.2g} MB of shards, {found.dataset_bytes / 1e6:.2g} MB of result")
+    for remark in found.remarks:
+        click.echo(f"probe     {remark}")
+    return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -35,18 +36,24 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, str(STAND_IN), *map(str, arguments)]
 
 
-def stand_in(*arguments: object) -> subprocess.CompletedProcess[str]:
+def process(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command(*arguments), capture_output=True, text=True, check=False, timeout=120)
 
 
-def etc_engine(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "etc_engine", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+@pytest.fixture
+def stand_in(capsys):
+    """The stand-in's command line inside this process, which saves the imports."""
+    spec = importlib.util.spec_from_file_location("stand_in", STAND_IN)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+    def call(*arguments: object) -> subprocess.CompletedProcess[str]:
+        capsys.readouterr()
+        status = module.main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return subprocess.CompletedProcess(arguments, status, captured.out, captured.err)
+
+    return call
 
 
 @pytest.fixture
@@ -74,7 +81,7 @@ def wait_for_lines(path: Path, count: int) -> None:
         time.sleep(0.01)
 
 
-def test_the_file_is_what_the_schema_says(study, tmp_path):
+def test_the_file_is_what_the_schema_says(stand_in, study, tmp_path):
     output = tmp_path / "out.nc"
     done = stand_in(study, "-o", output)
     assert done.returncode == 0
@@ -116,7 +123,7 @@ def test_the_file_is_what_the_schema_says(study, tmp_path):
             assert variable.attrs.get("long_name"), name
 
 
-def test_failed_cells_stay_out_and_are_told(study, tmp_path):
+def test_failed_cells_stay_out_and_are_told(stand_in, study, tmp_path):
     study.write_text(STUDY.replace("realizations = 5", "realizations = 40"))
     done = stand_in(study, "-o", tmp_path / "out.nc", "--trouble")
     assert done.returncode == 4
@@ -134,7 +141,7 @@ def test_failed_cells_stay_out_and_are_told(study, tmp_path):
     assert (data["message"].values[status.values <= 1] == "").all()
 
 
-def test_without_prescribed_angles_there_is_no_angle_dimension(study, tmp_path):
+def test_without_prescribed_angles_there_is_no_angle_dimension(stand_in, study, tmp_path):
     text = STUDY.replace('rule = "bonded"\ncontact_angle = [2.5, 5.0]', 'rule = "overlap"')
     study.write_text(text.replace("density = [0.65, 0.7]\n", ""))
     assert stand_in(study, "-o", tmp_path / "out.nc").returncode == 0
@@ -143,7 +150,7 @@ def test_without_prescribed_angles_there_is_no_angle_dimension(study, tmp_path):
     assert data["density"].values == pytest.approx([0.8])  # the stand-in's own
 
 
-def test_an_added_density_or_realization_changes_no_other_cell(study, tmp_path):
+def test_an_added_density_or_realization_changes_no_other_cell(stand_in, study, tmp_path):
     stand_in(study, "-o", tmp_path / "few.nc")
     study.write_text(STUDY.replace("[0.65, 0.7]", "[0.7, 0.6, 0.65, 0.75]").replace("= 5\n", "= 8\n"))
     stand_in(study, "-o", tmp_path / "many.nc")
@@ -153,7 +160,7 @@ def test_an_added_density_or_realization_changes_no_other_cell(study, tmp_path):
     assert (part["random_stream"].values == few["random_stream"].values).all()
 
 
-def test_an_existing_output_is_refused_resumed_or_replaced(study, tmp_path):
+def test_an_existing_output_is_refused_resumed_or_replaced(stand_in, study, tmp_path):
     output, log = tmp_path / "out.nc", tmp_path / "log"
     stand_in(study, "-o", output)
     before = output.read_bytes()
@@ -174,7 +181,7 @@ def test_an_existing_output_is_refused_resumed_or_replaced(study, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_warning_signal_keeps_finished_units_and_resume_ends_in_the_same_bits(study, tmp_path, number):
+def test_a_warning_signal_keeps_finished_units_and_resume_ends_in_the_same_bits(stand_in, study, tmp_path, number):
     output, log = tmp_path / "out.nc", tmp_path / "log"
     status, errors = interrupted(study, output, log, number)
     assert status == 75, errors
@@ -193,7 +200,7 @@ def test_a_warning_signal_keeps_finished_units_and_resume_ends_in_the_same_bits(
     assert not output.with_name("out.nc.shards").exists()
 
 
-def test_another_study_is_not_mixed_in(study, tmp_path):
+def test_another_study_is_not_mixed_in(stand_in, study, tmp_path):
     output = tmp_path / "out.nc"
     interrupted(study, output, tmp_path / "log", signal.SIGTERM)
     study.write_text(STUDY.replace("0.02", "0.03"))
@@ -208,7 +215,7 @@ def test_another_study_is_not_mixed_in(study, tmp_path):
         study.write_text(STUDY.replace("0.02", "0.03"))
 
 
-def test_a_second_process_on_the_same_output_is_refused(study, tmp_path):
+def test_a_second_process_on_the_same_output_is_refused(stand_in, study, tmp_path):
     output, log = tmp_path / "out.nc", tmp_path / "log"
     running = subprocess.Popen(command(study, "-o", output, "--seconds", 0.5, "--log", log))
     try:
@@ -223,14 +230,14 @@ def test_a_second_process_on_the_same_output_is_refused(study, tmp_path):
     assert len(log.read_text().splitlines()) == 10
 
 
-def test_a_full_disk_stops_resumably(study, tmp_path):
+def test_a_full_disk_stops_resumably(stand_in, study, tmp_path):
     """A limit on the size of files stands in for the end of the disk."""
     output, log = tmp_path / "out.nc", tmp_path / "log"
-    stopped = stand_in(study, "-o", output, "--log", log, "--file-limit", 3000)
+    stopped = process(study, "-o", output, "--log", log, "--file-limit", 3000)
     assert stopped.returncode == 75
     assert "cannot write shard" in stopped.stderr
     assert "go on with --resume" in stopped.stderr
-    resumed = stand_in(study, "-o", output, "--policy", "resume", "--log", log, "--file-limit", 20000)
+    resumed = process(study, "-o", output, "--policy", "resume", "--log", log, "--file-limit", 20000)
     assert resumed.returncode == 75  # the shards fit, the dataset does not
     assert f"cannot write {output}" in resumed.stderr
     assert not output.exists()
@@ -252,7 +259,7 @@ def test_a_full_disk_stops_resumably(study, tmp_path):
         (["study.toml", "-o", "out.nc", "--resume", "--overwrite"], "exclude each other"),
     ],
 )
-def test_refusals_are_one_line_and_leave_nothing(study, tmp_path, monkeypatch, arguments, words):
+def test_refusals_are_one_line_and_leave_nothing(etc_engine, study, tmp_path, monkeypatch, arguments, words):
     monkeypatch.chdir(tmp_path)
     done = etc_engine("sweep", *arguments)
     assert done.returncode == 2
@@ -263,7 +270,7 @@ def test_refusals_are_one_line_and_leave_nothing(study, tmp_path, monkeypatch, a
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_that_may_not_be_written_is_refused(study, tmp_path):
+def test_a_folder_that_may_not_be_written_is_refused(stand_in, study, tmp_path):
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o500)
     done = stand_in(study, "-o", closed / "out.nc")

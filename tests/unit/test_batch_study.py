@@ -91,6 +91,9 @@ def test_without_density_the_packer_decides():
         ("box =", 'periodic = "xq"\nbox =', ("periodic", "'xq'")),
         ("uniform:0.01:0.02", "triangle:0.01", ("packing", "radii", "triangle:0.01")),
         ("box =", "growth_rate = 0.1\nbox =", ("packing", "growth_rate", "advancing-front")),
+        ("box =", "count = 100\nbox =", ("packing", "count", "advancing-front")),
+        ("uniform:0.01:0.02", "equal", ("packing", "radii", "equal:0.01")),
+        ("[statistics]", '[models]\nnames = ["maxwel"]\n[statistics]', ("models", "maxwel", "did you mean maxwell")),
         ("schema = 1", "schema = = 1", ("not valid TOML", "line 2")),
     ],
 )

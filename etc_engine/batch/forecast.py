@@ -1,0 +1,131 @@
+"""What a sweep would do: units, time and memory from a timed probe, and what --resume would find."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from etc_engine.batch.claim import difference
+from etc_engine.batch.dataset import assemble, open_dataset
+from etc_engine.batch.lock import Holder, alive, read_holder
+from etc_engine.batch.plan import Unit, units_to_run
+from etc_engine.batch.records import Record, encode
+from etc_engine.batch.shards import SUFFIX, ShardReader, read_study_file, shard_folder
+from etc_engine.batch.study import Study, read_study
+from etc_engine.batch.sweep import Realize, run_unit
+from etc_engine.errors import EtcError
+
+PROBE_SECONDS = 20.0
+"""A probe that took longer than this is not repeated: what it lost to compilation is a small part of it."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a sweep would do.
+
+    ``units`` are planned at first, ``most_units`` at most (adaptive sweeps); ``unit_seconds`` are those of the
+    costliest and the cheapest unit, ``first_seconds`` of the very first one, with compilation.
+    """
+
+    units: int
+    most_units: int
+    cells: int
+    finished: int
+    state: str
+    ranks: int
+    first_seconds: float
+    unit_seconds: tuple[float, float]
+    rank_bytes: int
+    shard_bytes: int
+    dataset_bytes: int
+    remarks: tuple[str, ...]
+
+    def seconds(self, units: int) -> float:
+        """Time for so many units on all ranks: an even mixture of the costliest and the cheapest."""
+        if units == 0:
+            return 0.0
+        even = 0.5 * sum(self.unit_seconds) * units / self.ranks
+        return self.first_seconds + max(even, *self.unit_seconds)
+
+
+def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Forecast:
+    """Probe a study without writing anything.
+
+    Raises
+    ------
+    StudyError
+        If the study is not valid.
+    """
+    study, _ = read_study(study_path)
+    state, done = what_is_there(study, output)
+    units = units_to_run(dict.fromkeys(study.densities, study.statistics.realizations), [])
+    first, record = _probe(study, units[0], realize)
+    costly = first if first > PROBE_SECONDS else _probe(study, units[0], realize)[0]
+    same = units[-1].density == units[0].density or first > PROBE_SECONDS
+    cheap = costly if same else _probe(study, units[-1], realize)[0]
+    messages = dict.fromkeys(cell.message for row in record.result.cells for cell in row if cell.message)
+    return Forecast(
+        units=len(units),
+        most_units=len(study.densities) * study.statistics.cap,
+        cells=len(units) * sum(map(len, record.result.cells)),
+        finished=sum(unit in done for unit in units),
+        state=state,
+        ranks=ranks,
+        first_seconds=first - costly,
+        unit_seconds=(costly, cheap),
+        rank_bytes=_peak_bytes(),
+        shard_bytes=len(encode(record)) * len(units),
+        dataset_bytes=assemble(study, {}, {}).nbytes,
+        remarks=tuple(messages),
+    )
+
+
+def what_is_there(study: Study, output: Path) -> tuple[str, set[Unit]]:
+    """What --resume would find, in words, and the finished units."""
+    folder = shard_folder(output)
+    holder = read_holder(folder / "lock")
+    busy = alive(folder / "lock", holder, Holder.this_process("forecast")) if holder else ""
+    if busy:
+        return f"another run is computing this output now: {busy}", set()
+    if folder.is_dir() and any(folder.glob(f"*{SUFFIX}")):
+        return _in_shards(study, folder)
+    if output.exists():
+        return _in_output(study, output)
+    return "no output and no shards: the sweep starts fresh", set()
+
+
+def _in_shards(study: Study, folder: Path) -> tuple[str, set[Unit]]:
+    found = read_study_file(folder)
+    if found is None or found[0] != study.digest():
+        what = f" ({difference(found[1], study.identity())})" if found else ""
+        return f"shards of another study{what}: --resume is refused, --overwrite starts anew", set()
+    reader = ShardReader(folder)
+    done = set(reader.read())
+    return f"{len(done)} finished units in shards ({reader.damaged} damaged): --resume goes on", done
+
+
+def _in_output(study: Study, output: Path) -> tuple[str, set[Unit]]:
+    try:
+        digest = open_dataset(output).attrs["study_digest"]
+    except EtcError as error:
+        return f"{error}: only --overwrite would go on", set()
+    if digest != study.digest():
+        return "the output of another study: --resume is refused, --overwrite starts anew", set()
+    every = {Unit(d, r) for d in study.densities for r in range(study.statistics.cap)}
+    return "the output is complete: --resume does nothing, --overwrite starts anew", every
+
+
+def _probe(study: Study, unit: Unit, realize: Realize) -> tuple[float, Record]:
+    """Time of a unit, and its record."""
+    started = time.perf_counter()
+    record = run_unit(study, study.realization_spec(unit.density), unit, 0, realize)
+    return time.perf_counter() - started, record
+
+
+def _peak_bytes() -> int:
+    """The most memory this process has held."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
