@@ -20,7 +20,10 @@ ORDER = (
     ("effective",),
     ("realization",),
     ("batch",),
-    ("results", "comparison", "figures", "service"),
+    ("results",),
+    ("comparison",),
+    ("figures",),
+    ("service",),
     ("cli",),
 )
 RANK = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
