@@ -1,5 +1,98 @@
-"""etc_engine: effective thermal conductivity of particle systems and its statistics."""
+"""etc_engine: effective thermal conductivity of particle systems and its statistics.
+
+The names below are the public ones; each is imported when it is first used, so that the command line starts fast.
+
+Examples
+--------
+>>> import numpy as np
+>>> from etc_engine import Box, PackingSpec, bonded_contacts, effective_conductivity, pack, parse_radii
+>>> packing = pack(PackingSpec("advancing-front", parse_radii("equal:0.05"), Box((1.0, 1.0))), np.random.default_rng(7))
+>>> bool(0.0 < effective_conductivity(bonded_contacts(packing, 0.1)).tensor[0, 0] < 1.0)
+True
+"""
 
 from __future__ import annotations
 
-__all__: list[str] = []
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from etc_engine.box import Box
+    from etc_engine.comparison import evaluate_models
+    from etc_engine.contacts import ContactNetwork, bonded_contacts, overlap_contacts
+    from etc_engine.dtem.field import ParticleField, recover_field
+    from etc_engine.dtem.interior import temperatures_inside
+    from etc_engine.dtem.steady import solve_steady
+    from etc_engine.effective import EffectiveConductivity, effective_conductivity, mean_field_conductivity
+    from etc_engine.errors import EtcError
+    from etc_engine.models.catalogue import evaluate as evaluate_model
+    from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii, solid_fraction
+    from etc_engine.packing.dumps import read_dump
+    from etc_engine.packing.files import read_csv
+    from etc_engine.percolation import find_backbone
+    from etc_engine.realization import RealizationSpec, realize
+
+_HOMES = {
+    "Box": "box",
+    "ContactNetwork": "contacts",
+    "EffectiveConductivity": "effective",
+    "EtcError": "errors",
+    "PackingSpec": "packing",
+    "ParticleField": "dtem.field",
+    "ParticlePacking": "packing",
+    "RealizationSpec": "realization",
+    "bonded_contacts": "contacts",
+    "effective_conductivity": "effective",
+    "evaluate_model": "models.catalogue:evaluate",
+    "evaluate_models": "comparison",
+    "find_backbone": "percolation",
+    "mean_field_conductivity": "effective",
+    "overlap_contacts": "contacts",
+    "pack": "packing",
+    "parse_radii": "packing",
+    "read_csv": "packing.files",
+    "read_dump": "packing.dumps",
+    "realize": "realization",
+    "recover_field": "dtem.field",
+    "solid_fraction": "packing",
+    "solve_steady": "dtem.steady",
+    "temperatures_inside": "dtem.interior",
+}
+
+__all__ = [
+    "Box",
+    "ContactNetwork",
+    "EffectiveConductivity",
+    "EtcError",
+    "PackingSpec",
+    "ParticleField",
+    "ParticlePacking",
+    "RealizationSpec",
+    "bonded_contacts",
+    "effective_conductivity",
+    "evaluate_model",
+    "evaluate_models",
+    "find_backbone",
+    "mean_field_conductivity",
+    "overlap_contacts",
+    "pack",
+    "parse_radii",
+    "read_csv",
+    "read_dump",
+    "realize",
+    "recover_field",
+    "solid_fraction",
+    "solve_steady",
+    "temperatures_inside",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, _, attribute = _HOMES[name].partition(":")
+    return getattr(import_module(f"{__name__}.{module}"), attribute or name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
