@@ -12,7 +12,7 @@ import click
 if TYPE_CHECKING:
     import xarray
 
-    from etc_engine.comparison import Fit, Phases
+    from etc_engine.comparison import Fit
 
 EXIT_BOUND_BROKEN = 3
 COLUMN = 18
@@ -30,22 +30,25 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     over the density. Exit status 3 if a rigorous bound is broken, which can happen to overlapping particles only.
     """
     from etc_engine.batch.dataset import open_dataset
-    from etc_engine.cli.options import print_json, replacing
-    from etc_engine.comparison import evaluate_models, fit_models, phases
+    from etc_engine.cli.options import check_picture, check_place, print_json, replacing
+    from etc_engine.comparison import evaluate_models, fit_models, model_lines
 
+    if output is not None:
+        check_picture(output)
+        check_place(output)
     dataset = open_dataset(result)
-    medium, comparison, fits = phases(dataset), evaluate_models(dataset), fit_models(dataset)
+    comparison, fits = evaluate_models(dataset), fit_models(dataset)
     if output is not None:
         from etc_engine.figures import save_comparison
 
         with replacing(output) as file:
-            save_comparison(comparison, medium, file)
+            save_comparison(comparison, model_lines(comparison), file)
     if as_json:
-        print_json(_record(result, output, comparison, medium, fits))
+        print_json(_record(result, output, comparison, fits))
     else:
-        _print_head(result, comparison, medium)
+        _print_head(result, comparison)
         _print_table(comparison)
-        _print_notes(comparison, medium)
+        _print_notes(comparison)
         _print_fits(fits)
         if output is not None:
             click.echo(f"figure: {output}")
@@ -72,17 +75,13 @@ def _cells(comparison: xarray.Dataset) -> list[tuple[dict[str, Any], xarray.Data
     ]
 
 
-def _record(
-    result: Path, output: Path | None, comparison: xarray.Dataset, medium: Phases, fits: tuple[Fit, ...]
-) -> dict[str, Any]:
+def _record(result: Path, output: Path | None, comparison: xarray.Dataset, fits: tuple[Fit, ...]) -> dict[str, Any]:
     from dataclasses import asdict
 
     return {
         "result": str(result),
         "figure": None if output is None else str(output),
-        "pore_conductivity": medium.pores,
-        "particle_conductivity": medium.particles,
-        "dimension": medium.dimension,
+        **{key: comparison.attrs[key] for key in ("pore_conductivity", "particle_conductivity", "dimension")},
         "confidence_level": comparison["half_width"].attrs["confidence_level"],
         "bounds_bind": bool(comparison.attrs["bounds_bind"]),
         "bound_broken": bool(comparison.attrs["bound_broken"]),
@@ -113,9 +112,10 @@ def _cell_record(labels: dict[str, Any], cell: xarray.Dataset) -> dict[str, Any]
     }
 
 
-def _print_head(result: Path, comparison: xarray.Dataset, medium: Phases) -> None:
+def _print_head(result: Path, comparison: xarray.Dataset) -> None:
     level = comparison["half_width"].attrs["confidence_level"]
-    click.echo(f"{result}: particles of {medium.particles:g} W/(m K), pores of {medium.pores:g} W/(m K)")
+    particles, pores = comparison.attrs["particle_conductivity"], comparison.attrs["pore_conductivity"]
+    click.echo(f"{result}: particles of {particles:g} W/(m K), pores of {pores:g} W/(m K)")
     click.echo(
         "simulation: mean of the tensor's diagonal over n realizations +- half-width of its "
         f"{100 * level:g} % Student-t interval [W/(m K)]"
@@ -170,7 +170,7 @@ def _model_words(one: xarray.Dataset) -> str:
     return f"{mark}{value:.4f} " + ("      -" if math.isnan(difference) else f"{100 * difference:+6.1f}%")
 
 
-def _print_notes(comparison: xarray.Dataset, medium: Phases) -> None:
+def _print_notes(comparison: xarray.Dataset) -> None:
     click.echo()
     notes = dict(zip(comparison["model"].values.tolist(), comparison["model_note"].values.tolist(), strict=True))
     zero = [name for name, note in notes.items() if note.startswith("is 0")]
@@ -179,7 +179,7 @@ def _print_notes(comparison: xarray.Dataset, medium: Phases) -> None:
     for name, note in notes.items():
         if note and name not in zero:
             click.echo(f"{name}: {note}")
-    if not medium.overlapping:
+    if not comparison.attrs["bounds_bind"]:
         click.echo("bounds: a comparison only; Hashin-Shtrikman bounds bind overlapping geometries, not bonded ones")
     elif comparison.attrs["bound_broken"]:
         click.echo("bounds: they bind overlapping particles, and are broken")

@@ -1,7 +1,19 @@
 """Simulated conductivities against closed-form models: differences, bounds, and fits over a sweep."""
 
-from etc_engine.comparison.evaluation import DEFAULT_MODELS, evaluate_models, model_curve
+from etc_engine.comparison.evaluation import DEFAULT_MODELS, evaluate_models, model_curve, model_lines
 from etc_engine.comparison.fits import Fit, Parameter, fit_models
-from etc_engine.comparison.simulation import Phases, phases
+from etc_engine.comparison.simulation import Phases, half_trace, phases, simulated
 
-__all__ = ["DEFAULT_MODELS", "Fit", "Parameter", "Phases", "evaluate_models", "fit_models", "model_curve", "phases"]
+__all__ = [
+    "DEFAULT_MODELS",
+    "Fit",
+    "Parameter",
+    "Phases",
+    "evaluate_models",
+    "fit_models",
+    "half_trace",
+    "model_curve",
+    "model_lines",
+    "phases",
+    "simulated",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,6 @@ from etc_engine.realization import Status
 
 if TYPE_CHECKING:
     import xarray
-
-__all__ = ["BINDING", "DEFAULT_MODELS", "MEAN_FIELD", "evaluate_models", "model_curve", "phases"]
 
 MEAN_FIELD = "contact_mean_field"
 """The model whose value is not a formula of the solid fraction: the sweep computes it on its own networks."""
@@ -62,7 +61,8 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         conductivity with its interval (see `etc_engine.comparison.simulation.simulated`), ``inside_bounds``,
         ``realizations_outside_bounds``. Over the densities: ``rms_relative_difference`` and ``best_model``,
         among estimates. Coordinates ``model_kind``, ``model_title`` and ``model_note`` (why a value is
-        missing, or 0). Attributes: ``bounds_bind``, ``bound_broken``, ``best_model``.
+        missing, or 0). Attributes: ``bounds_bind``, ``bound_broken``, ``best_model``, the phases, and
+        ``model_parameters`` as JSON.
 
     Raises
     ------
@@ -110,6 +110,12 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         model_title=("model", np.array([model.title for model in records], dtype=object)),
         model_note=("model", np.array(notes, dtype=object)),
     )
+    result.attrs |= {
+        "pore_conductivity": medium.pores,
+        "particle_conductivity": medium.particles,
+        "dimension": medium.dimension,
+        "model_parameters": json.dumps({name: dict(values) for name, values in parameters.items()}),
+    }
     _add_differences(result)
     _add_bounds(result, dataset, medium)
     _add_best(result)
@@ -165,6 +171,39 @@ def model_curve(
         return values, reasons[0]
     zero = medium.pores == 0.0 and bool((values[~np.isnan(values)] == 0.0).all())
     return values, "is 0: the pores insulate" if zero else ""
+
+
+def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
+    """The models of a comparison on many densities, for smooth lines.
+
+    Parameters
+    ----------
+    comparison : xarray.Dataset
+        From `evaluate_models`.
+    points : int
+        Number of densities; those of the sweep if it has fewer than two with a solid fraction.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``model_conductivity`` on ``model`` and ``density``, with the solid fraction interpolated between the
+        densities of the sweep. Without the contact mean field, which has values on the sweep only.
+    """
+    import xarray
+
+    density, fraction = comparison["density"].values, comparison["solid_fraction"].values
+    known = np.isfinite(fraction)
+    if known.sum() >= 2:
+        fine = np.linspace(density[known][0], density[known][-1], points)
+        density, fraction = fine, np.interp(fine, density[known], fraction[known])
+    overlapping = bool(comparison.attrs["bounds_bind"])
+    attrs = comparison.attrs
+    medium = Phases(attrs["pore_conductivity"], attrs["particle_conductivity"], attrs["dimension"], overlapping)
+    parameters = json.loads(attrs["model_parameters"])
+    names = [str(name) for name in comparison["model"].values if str(name) != MEAN_FIELD]
+    values = np.array([model_curve(name, medium, fraction, parameters[name])[0] for name in names])
+    lines = xarray.Dataset({"model_conductivity": (("model", "density"), values)})
+    return lines.assign_coords(model=np.array(names, dtype=object), density=density)
 
 
 def _wanted(dataset: xarray.Dataset, models: Models | None) -> dict[str, Mapping[str, float]]:

@@ -25,7 +25,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
-FORMATS = ("png", "pdf", "svg")
+FORMATS = ("png", "pdf", "svg", "jpg")
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -49,7 +49,7 @@ def save(figure: Figure, path: Path | str) -> None:
     Raises
     ------
     OutputError
-        If the ending is not png, pdf or svg, or the file cannot be written.
+        If the ending is none of png, pdf, svg and jpg, or the file cannot be written.
     """
     path = Path(path)
     ending = path.suffix.lower().lstrip(".")

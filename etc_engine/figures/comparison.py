@@ -13,13 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from etc_engine.comparison import model_curve
-from etc_engine.comparison.evaluation import MEAN_FIELD
-from etc_engine.comparison.simulation import Phases
 from etc_engine.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, save, spread, style
 
 if TYPE_CHECKING:
     import xarray
+
+MEAN_FIELD = "contact_mean_field"
 
 DECADES = 1.3
 """A logarithmic axis is used when the simulated values span more than this many decades."""
@@ -51,20 +50,20 @@ class _Axis:
     curves: str | None
 
 
-def save_comparison(comparison: xarray.Dataset, medium: Phases, path: Path | str) -> None:
+def save_comparison(comparison: xarray.Dataset, lines: xarray.Dataset, path: Path | str) -> None:
     """Write the figure of a comparison as png, pdf or svg; see `draw_comparison`."""
-    save(draw_comparison(comparison, medium), path)
+    save(draw_comparison(comparison, lines), path)
 
 
-def draw_comparison(comparison: xarray.Dataset, medium: Phases) -> Figure:
+def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure:
     """Mean conductivity with its confidence band, a curve for each contact angle, and the models.
 
     Parameters
     ----------
     comparison : xarray.Dataset
         From `etc_engine.comparison.evaluate_models`.
-    medium : Phases
-        The phases behind it, for smooth model lines.
+    lines : xarray.Dataset
+        From `etc_engine.comparison.model_lines`.
 
     Returns
     -------
@@ -83,7 +82,7 @@ def draw_comparison(comparison: xarray.Dataset, medium: Phases) -> Figure:
         if logarithmic:
             axes.set_yscale("log")
         _draw_simulation(axes, part, axis)
-        _draw_models(axes, part, medium, axis)
+        _draw_models(axes, part, lines, axis)
         axes.set_title(title, fontsize=9)
         axes.set_xlabel(axis.label, fontsize=9)
     if not logarithmic:
@@ -94,9 +93,9 @@ def draw_comparison(comparison: xarray.Dataset, medium: Phases) -> Figure:
         axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
     for row in range(rows):
         last = min(len(panels), (row + 1) * columns) - 1
-        _label_models(grid.flat[last], panels[last][1], medium, axis)
+        _label_models(grid.flat[last], panels[last][1], lines, axis)
     _legend(figure, panels[0][1], axis)
-    figure.supxlabel(_notes(comparison, medium), fontsize=7.5, color="#555555")
+    figure.supxlabel(_notes(comparison), fontsize=7.5, color="#555555")
     return figure
 
 
@@ -148,18 +147,6 @@ def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
             axes.plot(x, field, linestyle=(0, (4, 2)), color=colour, linewidth=0.9, zorder=2)
 
 
-def _fine(part: xarray.Dataset, axis: _Axis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Many points of the horizontal axis, and the solid fraction there."""
-    x, fraction = part[axis.dim].values, part["solid_fraction"].values
-    if axis.dim != "density":
-        return x, np.full(x.size, float(fraction))
-    known = np.isfinite(fraction)
-    if known.sum() < 2:
-        return x, fraction
-    fine = np.linspace(x[known][0], x[known][-1], 60)
-    return fine, np.interp(fine, x[known], fraction[known])
-
-
 def _drawn(part: xarray.Dataset) -> list[str]:
     """The models that get a line: formulas with a value other than 0 somewhere."""
     names = [str(name) for name in part["model"].values if name != MEAN_FIELD]
@@ -168,34 +155,26 @@ def _drawn(part: xarray.Dataset) -> list[str]:
 
 
 def _lines(
-    part: xarray.Dataset, medium: Phases, axis: _Axis
+    part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis
 ) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
-    x, fraction = _fine(part, axis)
-    lines = []
-    for name in _drawn(part):
-        y, _ = model_curve(name, medium, fraction)
-        if np.isfinite(y).sum() < 2:  # its inputs are not those of a formula of the fraction alone
-            values = part["model_conductivity"].sel({"model": name})
-            others = [dim for dim in values.dims if dim != axis.dim]
-            lines.append((name, part[axis.dim].values, values.isel(dict.fromkeys(others, 0)).values))
-        else:
-            lines.append((name, x, y))
-    return lines
+    """Name, abscissas and ordinates of every model line."""
+    source = lines if axis.dim == "density" else part
+    x, values = source[axis.dim].values, source["model_conductivity"]
+    return [(name, x, np.broadcast_to(values.sel({"model": name}).values, x.shape)) for name in _drawn(part)]
 
 
-def _draw_models(axes: Axes, part: xarray.Dataset, medium: Phases, axis: _Axis) -> None:
+def _draw_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
     bound = {"hashin_shtrikman_lower", "hashin_shtrikman_upper", "series", "parallel"}
-    for name, x, y in _lines(part, medium, axis):
+    for name, x, y in _lines(part, lines, axis):
         axes.plot(x, y, color=INK if name in bound else GREY, linewidth=0.8, linestyle="-" if name in bound else "-.")
         if x.size == 1:
             axes.plot(x, y, marker="_", color=GREY, markersize=14)
 
 
-def _label_models(axes: Axes, part: xarray.Dataset, medium: Phases, axis: _Axis) -> None:
+def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
     """Names at the right ends of the model lines, moved apart where they would overlap."""
-    lines = _lines(part, medium, axis)
     ends = []
-    for name, x, y in lines:
+    for name, x, y in _lines(part, lines, axis):
         i = int(np.flatnonzero(np.isfinite(y))[-1])
         ends.append((name, float(x[i]), float(y[i])))
     if not ends:
@@ -240,7 +219,7 @@ def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
     )
 
 
-def _notes(comparison: xarray.Dataset, medium: Phases) -> str:
+def _notes(comparison: xarray.Dataset) -> str:
     level = comparison["half_width"].attrs["confidence_level"]
     counts = comparison["count"].values[comparison["count"].values > 0]
     few, many = (int(counts.min()), int(counts.max())) if counts.size else (0, 0)
@@ -251,7 +230,7 @@ def _notes(comparison: xarray.Dataset, medium: Phases) -> str:
     zero = [
         SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
     ]
-    if zero and medium.pores == 0.0:
+    if zero and comparison.attrs["pore_conductivity"] == 0.0:
         notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
     notes.append(f"{BOUNDS_NOTE}.")
     return "\n".join(notes)

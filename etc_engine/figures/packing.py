@@ -54,7 +54,7 @@ def draw_packing(packing: ParticlePacking) -> Figure:
         linewidths=min(0.6, 20.0 / np.sqrt(radii.size)),
     )
     low, high = float(shade.min()), float(shade.max())
-    discs.set_clim(low if spheres else low - (high - low) - 0.2 * high, high if spheres else high + 0.4 * (high - low))
+    discs.set_clim(low if spheres else 2.0 * low - 1.2 * high, high if spheres else 1.8 * high - 0.4 * low)
     axes.add_collection(discs)
     if high - low > 1e-9 * high:
         bar = figure.colorbar(discs, ax=axes, shrink=0.5, aspect=25, pad=0.02)
