@@ -43,7 +43,7 @@ Notify = Callable[[str], None]
 """Called on rank 0 with a remark."""
 
 NEXT, DONE, FAILED = 0, 1, 2
-VISIBLE_SECONDS = 60.0
+AWAIT_SECONDS, VISIBLE_SECONDS = 0.2, 60.0
 """How long a network file system may take to show rank 0 what other ranks have written."""
 
 
@@ -238,13 +238,15 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
 def _await_units(reader: ShardReader, units: Sequence[Unit]) -> None:
     """Wait until a network file system shows rank 0 what the other ranks have synced."""
     deadline = time.monotonic() + VISIBLE_SECONDS
-    while missing := [unit for unit in units if unit not in reader.read()]:
+    reader.read()
+    while missing := [unit for unit in units if unit not in reader.records]:
         if time.monotonic() > deadline:
             raise OutputError(
                 f"{len(missing)} finished units do not appear in {reader.folder}, the first is {missing[0]}: "
                 "do all ranks see the same folder? go on with --resume"
             )
-        time.sleep(0.2)
+        time.sleep(AWAIT_SECONDS)
+        reader.read()
 
 
 def _finish(claim: Claim, reader: ShardReader, computed: int) -> Outcome:
