@@ -15,7 +15,7 @@ set -uo pipefail
 
 study=${1:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
 output=${2:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
-read -r -a launcher <<<"${ETC_LAUNCHER:-srun --kill-on-bad-exit=0}"
+read -r -a launcher <<<"${ETC_LAUNCHER:-srun --kill-on-bad-exit=1}"
 
 "${launcher[@]}" etc-engine sweep "$study" -o "$output" --resume
 status=$?

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.batch.plan import Unit, stream_fingerprint
-from etc_engine.batch.records import Record
 from etc_engine.batch.shards import sync_folder
 from etc_engine.batch.statistics import summarize
 from etc_engine.batch.study import Study
+from etc_engine.batch.table import CELL_VARIABLES, UNIT_VARIABLES, Table
 from etc_engine.errors import OutputError
 from etc_engine.realization import Status
 
@@ -30,44 +28,6 @@ INCIDENTAL = ("_seconds", "_rank", "_host", "_time")
 """Endings of the names of variables that differ from run to run."""
 
 
-@dataclass(frozen=True)
-class Variable:
-    """How a quantity is stored: numpy type, what stands in cells that were not run, and its meaning."""
-
-    dtype: Any
-    empty: Any
-    long_name: str
-    units: str = "1"
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """The attributes of the stored variable."""
-        return {"long_name": self.long_name, "units": self.units}
-
-
-CELL_VARIABLES = {
-    "contacts": Variable(np.int64, -1, "number of contacts between particles, before pruning"),
-    "wall_contacts": Variable(np.int64, -1, "number of contacts with walls, before pruning"),
-    "coordination": Variable(np.float64, np.nan, "mean coordination number, before pruning"),
-    "unknowns": Variable(np.int64, -1, "number of unknowns of the linear system, after pruning"),
-    "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
-    "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
-    "mean_field_conductivity": Variable(
-        np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
-    ),
-    "solve_seconds": Variable(np.float64, np.nan, "time to solve", "s"),
-}
-UNIT_VARIABLES = {
-    "particles": Variable(np.int64, -1, "number of particles, before pruning"),
-    "packing_density": Variable(np.float64, np.nan, "sum of full particle areas over the area of the box"),
-    "solid_fraction": Variable(np.float64, np.nan, "area of the union of the particles over the area of the box"),
-    "pack_seconds": Variable(np.float64, np.nan, "time to pack", "s"),
-    "random_stream": Variable(np.uint64, 0, "first 64 bits of the random stream"),
-    "worker_rank": Variable(np.int64, -1, "rank that computed the realization"),
-    "worker_host": Variable(object, "", "host that computed the realization"),
-    "start_time": Variable(np.float64, np.nan, "start of the realization", "seconds since 1970-01-01"),
-    "end_time": Variable(np.float64, np.nan, "end of the realization", "seconds since 1970-01-01"),
-}
 STATISTICS = {
     "mean": "mean of the conductivity over realizations",
     "std": "standard deviation of the conductivity over realizations",
@@ -82,15 +42,15 @@ STREAM_COMMENT = (
 ANGLE_COMMENT = "half of the angle that the contact arc subtends at the centre of a disk; not a wetting angle"
 
 
-def assemble(study: Study, records: Mapping[Unit, Record], attributes: Mapping[str, Any]) -> xarray.Dataset:
-    """The dataset of a study from the records of its units.
+def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """The dataset of a study from the table of its units.
 
     Parameters
     ----------
     study : Study
         The study; it gives the dimensions.
-    records : mapping of Unit to Record
-        What was run; cells without a record are ``not_run``.
+    table : Table
+        What was run; cells without a row are ``not_run``.
     attributes : mapping
         Global attributes, see :mod:`etc_engine.batch.provenance`.
 
@@ -102,9 +62,7 @@ def assemble(study: Study, records: Mapping[Unit, Record], attributes: Mapping[s
     """
     import xarray
 
-    wanted = {Unit(d, r) for d in study.densities for r in range(study.statistics.cap)}
-    records = {unit: record for unit, record in records.items() if unit in wanted}
-    cells, units = _cell_values(study, records), _unit_values(study, records)
+    cells, units = _cell_values(study, table), _unit_values(study, table)
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (CELL + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
@@ -149,51 +107,28 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
     }
 
 
-def _cell_values(study: Study, records: Mapping[Unit, Record]) -> Values:
+def _cell_values(study: Study, table: Table) -> Values:
     """Arrays over (density, contact_angle, method, realization)."""
-    d = study.box.dimension
-    shape = (
-        len(study.densities),
-        len(study.contacts.contact_angle or (None,)),
-        len(study.conduction.methods),
-        study.statistics.cap,
-    )
+    rows, d = table.rows, study.box.dimension
+    angles, methods = rows.dtype["status"].shape
+    shape = (len(study.densities), angles, methods, study.statistics.cap)
     values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in CELL_VARIABLES.items()}
     values["conductivity"] = np.full((*shape, d, d), np.nan)
     values["status"] = np.full(shape, Status.NOT_RUN, np.int8)
+    for name, grid in values.items():
+        grid[rows["density_index"], :, :, rows["realization"]] = rows[name]
     values["message"] = np.full(shape, "", object)
-    for unit, record in records.items():
-        i = study.densities.index(unit.density)
-        for a, row in enumerate(record.result.cells):
-            for m, cell in enumerate(row):
-                place = (i, a, m, unit.realization)
-                values["status"][place], values["message"][place] = int(cell.status), cell.message
-                for name in CELL_VARIABLES:
-                    values[name][place] = getattr(cell, name)
-                if cell.status <= Status.NOT_PERCOLATING:
-                    values["conductivity"][place] = cell.conductivity
+    for (i, r, a, m), text in table.messages.items():
+        values["message"][i, a, m, r] = text
     return values
 
 
-def _unit_values(study: Study, records: Mapping[Unit, Record]) -> Values:
+def _unit_values(study: Study, table: Table) -> Values:
     """Arrays over (density, realization)."""
-    shape = (len(study.densities), study.statistics.cap)
+    rows, shape = table.rows, (len(study.densities), study.statistics.cap)
     values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in UNIT_VARIABLES.items()}
-    for unit, record in records.items():
-        place = (study.densities.index(unit.density), unit.realization)
-        stored = {
-            "particles": record.result.particles,
-            "packing_density": record.result.density,
-            "solid_fraction": record.result.solid_fraction,
-            "pack_seconds": record.result.pack_seconds,
-            "random_stream": stream_fingerprint(study.seed, unit),
-            "worker_rank": record.rank,
-            "worker_host": record.host,
-            "start_time": record.start_time,
-            "end_time": record.end_time,
-        }
-        for name, value in stored.items():
-            values[name][place] = value
+    for name, grid in values.items():
+        grid[rows["density_index"], rows["realization"]] = rows[name]
     return values
 
 

@@ -8,6 +8,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from etc_engine.batch.claim import difference
 from etc_engine.batch.dataset import assemble, open_dataset
 from etc_engine.batch.lock import Holder, alive, read_holder
@@ -16,6 +19,7 @@ from etc_engine.batch.records import Record, encode
 from etc_engine.batch.shards import SUFFIX, ShardReader, read_study_file, shard_folder
 from etc_engine.batch.study import Study, read_study
 from etc_engine.batch.sweep import Realize, run_unit
+from etc_engine.batch.table import tabulate
 from etc_engine.errors import EtcError
 
 PROBE_SECONDS = 20.0
@@ -61,29 +65,30 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
     """
     study, _ = read_study(study_path)
     state, done = what_is_there(study, output)
-    units = units_to_run(dict.fromkeys(study.densities, study.statistics.realizations), [])
+    targets = (study.statistics.realizations,) * len(study.densities)
+    units = units_to_run(study.densities, targets, np.empty((0, 2), np.int64))
     first, record = _probe(study, units[0], realize)
     costly = first if first > PROBE_SECONDS else _probe(study, units[0], realize)[0]
-    same = units[-1].density == units[0].density or first > PROBE_SECONDS
+    same = units[-1, 0] == units[0, 0] or first > PROBE_SECONDS
     cheap = costly if same else _probe(study, units[-1], realize)[0]
     messages = dict.fromkeys(cell.message for row in record.result.cells for cell in row if cell.message)
     return Forecast(
         units=len(units),
         most_units=len(study.densities) * study.statistics.cap,
         cells=len(units) * sum(map(len, record.result.cells)),
-        finished=sum(unit in done for unit in units),
+        finished=sum(tuple(unit) in done for unit in units.tolist()),
         state=state,
         ranks=ranks,
         first_seconds=first - costly,
         unit_seconds=(costly, cheap),
         rank_bytes=_peak_bytes(),
         shard_bytes=len(encode(record)) * len(units),
-        dataset_bytes=assemble(study, {}, {}).nbytes,
+        dataset_bytes=assemble(study, tabulate(study, []), {}).nbytes,
         remarks=tuple(messages),
     )
 
 
-def what_is_there(study: Study, output: Path) -> tuple[str, set[Unit]]:
+def what_is_there(study: Study, output: Path) -> tuple[str, set[tuple[int, int]]]:
     """What --resume would find, in words, and the finished units."""
     folder = shard_folder(output)
     holder = read_holder(folder / "lock")
@@ -97,29 +102,30 @@ def what_is_there(study: Study, output: Path) -> tuple[str, set[Unit]]:
     return "no output and no shards: the sweep starts fresh", set()
 
 
-def _in_shards(study: Study, folder: Path) -> tuple[str, set[Unit]]:
+def _in_shards(study: Study, folder: Path) -> tuple[str, set[tuple[int, int]]]:
     found = read_study_file(folder)
     if found is None or found[0] != study.digest():
         what = f" ({difference(found[1], study.identity())})" if found else ""
         return f"shards of another study{what}: --resume is refused, --overwrite starts anew", set()
     reader = ShardReader(folder)
-    done = set(reader.read())
+    done = {(int(i), int(r)) for i, r in tabulate(study, reader.read(reader.files())).units}
     return f"{len(done)} finished units in shards ({reader.damaged} damaged): --resume goes on", done
 
 
-def _in_output(study: Study, output: Path) -> tuple[str, set[Unit]]:
+def _in_output(study: Study, output: Path) -> tuple[str, set[tuple[int, int]]]:
     try:
         digest = open_dataset(output).attrs["study_digest"]
     except EtcError as error:
         return f"{error}: only --overwrite would go on", set()
     if digest != study.digest():
         return "the output of another study: --resume is refused, --overwrite starts anew", set()
-    every = {Unit(d, r) for d in study.densities for r in range(study.statistics.cap)}
+    every = {(i, r) for i in range(len(study.densities)) for r in range(study.statistics.cap)}
     return "the output is complete: --resume does nothing, --overwrite starts anew", every
 
 
-def _probe(study: Study, unit: Unit, realize: Realize) -> tuple[float, Record]:
+def _probe(study: Study, place: NDArray[np.int64], realize: Realize) -> tuple[float, Record]:
     """Time of a unit, and its record."""
+    unit = Unit(study.densities[place[0]], int(place[1]))
     started = time.perf_counter()
     record = run_unit(study, study.realization_spec(unit.density), unit, 0, realize)
     return time.perf_counter() - started, record

@@ -8,25 +8,26 @@ makes the same plan.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from etc_engine.batch.statistics import half_width
-from etc_engine.realization import Realization, Status
+from etc_engine.realization import Status
 
 if TYPE_CHECKING:
-    from etc_engine.batch.records import Record
     from etc_engine.batch.study import Study
+    from etc_engine.batch.table import Table
 
 GROWTH_LIMIT = 4
 """A round of an adaptive sweep multiplies the realizations of a density by at most this: the first
 estimates of the spread are poor, and one of them must not order thousands of units."""
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True)
 class Unit:
     """One packing and everything solved on it. ``density`` None is the packer's own."""
 
@@ -65,29 +66,44 @@ def stream_fingerprint(seed: int, unit: Unit) -> int:
     return int(unit_seed(seed, unit).generate_state(1, np.uint64)[0])
 
 
-def units_to_run(targets: Mapping[float | None, int], finished: Iterable[Unit]) -> list[Unit]:
+def units_to_run(
+    densities: Sequence[float | None], targets: Sequence[int], finished: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """Units of all densities up to their targets that are not finished, the costliest first.
 
     A unit costs what its particles cost, and their number grows with the density. With the large units
     first the small ones even out the ends of the ranks.
+
+    Parameters
+    ----------
+    densities : sequence of float or None
+        The densities of the study.
+    targets : sequence of int
+        How many realizations each of them is to have.
+    finished : ndarray, shape (m, 2)
+        Density index and realization of the units that are there.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Density index and realization of the units to run.
     """
-    done = set(finished)
-    wanted = (Unit(density, r) for density, target in targets.items() for r in range(target))
-    return sorted((unit for unit in wanted if unit not in done), key=_costliest_first)
-
-
-def _costliest_first(unit: Unit) -> tuple[float, int]:
-    return (-(unit.density or 0.0), unit.realization)
+    done = np.zeros((len(densities), 1 + max([*targets, *finished[:, 1]])), dtype=bool)
+    done[finished[:, 0], finished[:, 1]] = True
+    wanted = np.arange(done.shape[1]) < np.asarray(targets)[:, None]
+    units = np.argwhere(wanted & ~done)
+    cost = np.array([density or 0.0 for density in densities])[units[:, 0]]
+    return units[np.lexsort((units[:, 1], -cost))]
 
 
 def needed_realizations(
-    samples: Sequence[float], realized: int, relative_ci: float, confidence: float, cap: int
+    samples: Sequence[float] | NDArray[np.float64], realized: int, relative_ci: float, confidence: float, cap: int
 ) -> int:
     r"""How many realizations a cell needs for :math:`t\,s/\sqrt{n} \le \epsilon\,|\bar k|`.
 
     Parameters
     ----------
-    samples : sequence of float
+    samples : sequence of float, shape (n,)
         The valid results of the cell, in the order of realizations.
     realized : int
         Realizations spent so far, failures included.
@@ -128,33 +144,29 @@ def needed_realizations(
     return int(min(cap, max(realized + 1, min(wanted, GROWTH_LIMIT * realized))))
 
 
-def next_targets(
-    study: Study, targets: Mapping[float | None, int], records: Mapping[Unit, Record]
-) -> dict[float | None, int]:
+def next_targets(study: Study, targets: Sequence[int], table: Table) -> tuple[int, ...]:
     """How many realizations each density needs after a round: its noisiest cell and direction decides.
 
     Only the units up to the targets count, so that units a former run has done beyond them do not matter.
     """
-    wish = study.statistics
+    wish, rows = study.statistics, table.rows
     if wish.relative_ci is None:
-        return dict(targets)
-    grown = {}
-    for density, target in targets.items():
-        results = [records[Unit(density, r)].result for r in range(target)]
+        return tuple(targets)
+    grown = []
+    for i, target in enumerate(targets):
+        mine = rows[(rows["density_index"] == i) & (rows["realization"] < target)]
         needs = [
             needed_realizations(samples, target, wish.relative_ci, wish.confidence, wish.cap)
-            for samples in _samples(results)
+            for samples in _samples(mine[np.argsort(mine["realization"])])
         ]
-        grown[density] = max(needs, default=target)
-    return grown
+        grown.append(max(needs, default=target))
+    return tuple(grown)
 
 
-def _samples(results: Sequence[Realization]) -> Iterator[list[float]]:
+def _samples(rows: NDArray[Any]) -> Iterator[NDArray[np.float64]]:
     """Valid conductivities of each cell and each direction that has one."""
-    for a, row in enumerate(results[0].cells):
-        for m in range(len(row)):
-            cells = [result.cells[a][m] for result in results]
-            valid = [np.diagonal(cell.conductivity) for cell in cells if cell.status <= Status.NOT_PERCOLATING]
-            for component in np.transpose(valid) if valid else ():
-                if np.isfinite(component).all():
-                    yield component.tolist()
+    angles, methods, d, _ = rows.dtype["conductivity"].shape
+    for a, m, k in np.ndindex(angles, methods, d):
+        samples = rows["conductivity"][rows["status"][:, a, m] <= Status.NOT_PERCOLATING, a, m, k, k]
+        if np.isfinite(samples).all():
+            yield samples

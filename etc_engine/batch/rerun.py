@@ -13,6 +13,7 @@ from etc_engine.batch.dataset import INCIDENTAL, assemble, same_bits
 from etc_engine.batch.plan import Unit
 from etc_engine.batch.study import Study
 from etc_engine.batch.sweep import Realize, run_unit
+from etc_engine.batch.table import tabulate
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
 
@@ -70,7 +71,7 @@ def rerun(
         raise InputError(f"realization {realization} was not run at this density: there is nothing to compare with")
     unit = Unit(study.densities[row], realization)
     record = run_unit(study, study.realization_spec(unit.density), unit, 0, realize)
-    again = assemble(study, {unit: record}, {}).isel(density=row, realization=realization)
+    again = assemble(study, tabulate(study, [record]), {}).isel(density=row, realization=realization)
     found = _unit_variables(again)
     agree = {str(name): same_bits(stored, found, str(name)) for name in found}
     return Comparison(float(dataset["density"].values[row]), realization, agree, stored, found)

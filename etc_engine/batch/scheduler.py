@@ -12,11 +12,13 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from types import ModuleType
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn, Protocol, TypeVar, cast
 
 import numpy as np
 
-from etc_engine.errors import InputError
+from etc_engine.errors import EtcError, InputError
+
+T = TypeVar("T")
 
 LAUNCHER_SIZES = {
     "PMI_SIZE": "MPICH, Intel MPI or a relative",
@@ -202,3 +204,17 @@ def connect(environment: Mapping[str, str] = os.environ) -> Communicator:
             "and library are of different kinds, use the mpiexec that belongs to the library"
         )
     return World(MPI)
+
+
+def on_rank_zero(communicator: Communicator, action: Callable[[], T]) -> T:
+    """What an action answers on rank 0, on every rank; an EtcError there is raised on every rank."""
+    answer: tuple[T | None, EtcError | None] = (None, None)
+    if communicator.rank == 0:
+        try:
+            answer = (action(), None)
+        except EtcError as error:
+            answer = (None, error)
+    answer = communicator.broadcast(answer)
+    if answer[1] is not None:
+        raise answer[1]
+    return cast(T, answer[0])

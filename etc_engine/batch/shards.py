@@ -20,14 +20,13 @@ import json
 import os
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from etc_engine.batch.plan import Unit
 from etc_engine.batch.records import Record, decode, encode
 from etc_engine.errors import OutputError
 
@@ -38,6 +37,11 @@ SUFFIX = ".shard"
 def shard_folder(output: Path) -> Path:
     """The folder that holds the shards of an output file."""
     return output.with_name(output.name + ".shards")
+
+
+def shard_path(folder: Path, run: str, rank: int) -> Path:
+    """The shard of one rank in one run."""
+    return folder / f"{run}-{rank:05d}{SUFFIX}"
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -83,7 +87,7 @@ class ShardWriter:
     """
 
     def __init__(self, folder: Path, run: str, rank: int) -> None:
-        self.path = folder / f"{run}-{rank:05d}{SUFFIX}"
+        self.path = shard_path(folder, run, rank)
         self._length = 0
         self._synced = time.monotonic()
         self._sync_seconds = 0.0
@@ -163,19 +167,23 @@ class ShardReader:
     """Reads what is new in the shards of a folder each time it is asked."""
 
     folder: Path
-    records: dict[Unit, Record] = field(default_factory=dict)
     damaged: int = 0
+    _known: list[Path] = field(default_factory=list)
     _read: dict[Path, int] = field(default_factory=dict)
 
-    def read(self) -> dict[Unit, Record]:
-        """All records so far; of a unit that was run twice the first, in the order of file names."""
-        for path in sorted(self.folder.glob(f"*{SUFFIX}")):
-            for text in self._new_lines(path):
-                record = decode(text)
-                self.records.setdefault(record.unit, record)
-        return self.records
+    def files(self, more: Iterable[Path] = ()) -> list[Path]:
+        """All shards, in an order that only grows; ``more`` are some that the folder may not show yet."""
+        found = {*self.folder.glob(f"*{SUFFIX}"), *more} - {*self._known}
+        self._known += sorted(found)
+        return self._known
+
+    def read(self, files: Iterable[Path]) -> list[Record]:
+        """The records of some shards that were not read before."""
+        return [decode(text) for path in files for text in self._new_lines(path)]
 
     def _new_lines(self, path: Path) -> Iterator[str]:
+        if not path.exists():
+            return  # written on another host, and not to be seen here yet
         with path.open("rb") as stream:
             stream.seek(self._read.get(path, 0))
             for line in stream:

@@ -1,6 +1,6 @@
 """A sweep from end to end: claim the output, run the units in rounds, write the dataset.
 
-Rank 0 decides (what to run, whether to go on) and every rank computes. Decisions read the shards alone,
+Rank 0 decides (what to run, whether to go on) and every rank computes. Decisions see the shards alone,
 so that a sweep in one go and a sweep in pieces take the same ones.
 """
 
@@ -9,33 +9,36 @@ from __future__ import annotations
 import socket
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from etc_engine.batch import provenance
 from etc_engine.batch.claim import Claim, Policy, claim_output, recorded_runs
 from etc_engine.batch.dataset import assemble, open_dataset, write_dataset
+from etc_engine.batch.gathering import Gatherer
 from etc_engine.batch.plan import Unit, next_targets, unit_rng, units_to_run
 from etc_engine.batch.records import Record, failed_realization
-from etc_engine.batch.scheduler import STOP, Communicator
-from etc_engine.batch.shards import ShardReader, ShardWriter, clear_folder
+from etc_engine.batch.scheduler import STOP, Communicator, on_rank_zero
+from etc_engine.batch.shards import ShardWriter, clear_folder, shard_path
 from etc_engine.batch.stop import Stopped, StopRequest
 from etc_engine.batch.study import Study
+from etc_engine.batch.table import Table
 from etc_engine.batch.watch import Watch
-from etc_engine.errors import EtcError, OutputError
+from etc_engine.errors import OutputError
 from etc_engine.realization import Realization, RealizationSpec, Status
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray
 
-T = TypeVar("T")
-Realize = Callable[[RealizationSpec, "np.random.Generator"], Realization]
+Realize = Callable[[RealizationSpec, np.random.Generator], Realization]
 Report = Callable[[int, int, int], None]
 """Called on rank 0 with units done, units planned and cells failed."""
 
@@ -43,8 +46,6 @@ Notify = Callable[[str], None]
 """Called on rank 0 with a remark."""
 
 NEXT, DONE, FAILED = 0, 1, 2
-VISIBLE_SECONDS = 60.0
-"""How long a network file system may take to show rank 0 what other ranks have written."""
 
 
 @dataclass(frozen=True)
@@ -108,52 +109,47 @@ def sweep(
         claim = on_rank_zero(communicator, partial(claim_output, study_path, output, policy, communicator.size, held))
         if claim.complete:
             return on_rank_zero(communicator, partial(_outcome_of_file, claim))
-        reader = ShardReader(claim.folder)
         with Watch(claim.folder / "lock", claim.run, launched=communicator.size > 1):
-            computed, stopped = _run_rounds(claim, reader, communicator, realize, stop, report, notify)
+            table, computed, stopped = _run_rounds(claim, communicator, realize, stop, report, notify)
         communicator.wait_for_all(_silent)  # nobody watches the lock any more, rank 0 may give it back
         if stopped:
             return Outcome(output, 0, computed, stopped=stopped)
-        return on_rank_zero(communicator, partial(_finish, claim, reader, computed))
+        return on_rank_zero(communicator, partial(_finish, claim, table, computed))
 
 
 def _run_rounds(
-    claim: Claim,
-    reader: ShardReader,
-    communicator: Communicator,
-    realize: Realize,
-    stop: StopRequest,
-    report: Report,
-    notify: Notify,
-) -> tuple[int, str]:
+    claim: Claim, communicator: Communicator, realize: Realize, stop: StopRequest, report: Report, notify: Notify
+) -> tuple[Table, int, str]:
     """Compute round after round until every cell is settled.
 
-    Answers how many units all ranks have computed, and why they stopped if they stopped early.
+    Answers the table (on rank 0), how many units all ranks have computed, and why they stopped if they did.
     """
-    computed = 0
-    targets = dict.fromkeys(claim.study.densities, claim.study.statistics.realizations)
+    gatherer, computed = Gatherer(claim.study, claim.folder, communicator), 0
+    targets = (claim.study.statistics.realizations,) * len(claim.study.densities)
+    table = gatherer.gather()
     for number in count():
-        plan = on_rank_zero(communicator, partial(_plan_round, claim, reader, targets, computed))
+        plan = on_rank_zero(communicator, partial(_plan_round, claim, table, targets, computed))
         if number == 0 and communicator.rank == 0:
-            _notify_start(claim, plan, reader, notify)
-        if not plan.units:
+            _notify_start(claim, plan, gatherer.damaged, notify)
+        if not plan.units.size:
             break
         base = computed + number * communicator.size
         round_ = _Round(claim, plan, base, f"{claim.run}-{number}", report)
         stopped = _run_round(round_, communicator, realize, stop)
         if stopped:
-            return communicator.add(DONE, 0), stopped
-        on_rank_zero(communicator, partial(_await_units, reader, plan.units))
+            return table, communicator.add(DONE, 0), stopped
+        written = shard_path(claim.folder, round_.shard, communicator.rank)
+        table = gatherer.gather_all(plan.units, written if written.exists() else None)
         targets, computed = plan.targets, computed + len(plan.units)
-    return computed, ""
+    return table, computed, ""
 
 
 @dataclass(frozen=True)
 class _Plan:
     """What a round computes, and where it stands in the whole: ``known`` units were there before this run."""
 
-    targets: dict[float | None, int]
-    units: list[Unit]
+    targets: tuple[int, ...]
+    units: NDArray[np.int64]
     known: int
     planned: int
 
@@ -175,20 +171,20 @@ class _Round:
             self.report(done, self.plan.planned, communicator.add(FAILED, 0))
 
 
-def _plan_round(claim: Claim, reader: ShardReader, targets: dict[float | None, int], computed: int) -> _Plan:
+def _plan_round(claim: Claim, table: Table, targets: tuple[int, ...], computed: int) -> _Plan:
     """The next round that has something to compute, or an empty one when every cell is settled.
 
-    Rounds that the shards hold already are decided again from the same records, as if they ran now.
+    Rounds that the shards hold already are decided again from the same units, as if they ran now.
     """
-    records = reader.read()
-    units = units_to_run(targets, records)
-    while not units:
-        grown = next_targets(claim.study, targets, records)
+    study = claim.study
+    units = units_to_run(study.densities, targets, table.units)
+    while not units.size:
+        grown = next_targets(study, targets, table)
         if grown == targets:
             break
         targets = grown
-        units = units_to_run(targets, records)
-    planned = sum(targets.values())
+        units = units_to_run(study.densities, targets, table.units)
+    planned = sum(targets)
     return _Plan(targets, units, planned - len(units) - computed, planned)
 
 
@@ -206,15 +202,18 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
     Every rank takes one number beyond the last unit: the next round's base allows for it.
     """
     claim, units = round_.claim, round_.plan.units
-    specs = {density: claim.study.realization_spec(density) for density in claim.study.densities}
+    densities = claim.study.densities
+    specs = [claim.study.realization_spec(density) for density in densities]
     try:
         with ShardWriter(claim.folder, round_.shard, communicator.rank) as shard:
             while (index := communicator.add(NEXT, 1) - round_.base) < len(units):
-                unit = units[index]
-                record = stop.run(partial(run_unit, claim.study, specs[unit.density], unit, communicator.rank, realize))
+                i, realization = units[index].tolist()
+                unit = Unit(densities[i], realization)
+                record = stop.run(partial(run_unit, claim.study, specs[i], unit, communicator.rank, realize))
                 shard.append(record)
                 communicator.add(DONE, 1)
-                communicator.add(FAILED, record.failed)
+                if record.failed:
+                    communicator.add(FAILED, record.failed)
                 round_.tell(communicator)
     except Stopped:
         communicator.add(NEXT, STOP)
@@ -235,25 +234,12 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     return Record(unit, result, rank, socket.gethostname(), started, time.time())
 
 
-def _await_units(reader: ShardReader, units: Sequence[Unit]) -> None:
-    """Wait until a network file system shows rank 0 what the other ranks have synced."""
-    deadline = time.monotonic() + VISIBLE_SECONDS
-    while missing := [unit for unit in units if unit not in reader.read()]:
-        if time.monotonic() > deadline:
-            raise OutputError(
-                f"{len(missing)} finished units do not appear in {reader.folder}, the first is {missing[0]}: "
-                "do all ranks see the same folder? go on with --resume"
-            )
-        time.sleep(0.2)
-
-
-def _finish(claim: Claim, reader: ShardReader, computed: int) -> Outcome:
+def _finish(claim: Claim, table: Table, computed: int) -> Outcome:
     """Assemble the dataset, put it in place, take the shards away."""
-    records = reader.read()
-    hosts = [record.host for record in records.values()]
+    hosts = np.unique(table.rows["worker_host"]).tolist()
     attributes = provenance.attributes(claim.study, claim.text, recorded_runs(claim.folder), hosts)
-    dataset = assemble(claim.study, records, attributes)
-    outcome = Outcome(claim.output, len(records), computed, _count_cells(dataset))
+    dataset = assemble(claim.study, table, attributes)
+    outcome = Outcome(claim.output, len(table.rows), computed, _count_cells(dataset))
     try:
         write_dataset(dataset, claim.output)
     except OutputError as error:
@@ -274,25 +260,11 @@ def _count_cells(dataset: xarray.Dataset) -> dict[Status, int]:
     return {status: found[int(status)] for status in Status if found[int(status)]}
 
 
-def _notify_start(claim: Claim, plan: _Plan, reader: ShardReader, notify: Notify) -> None:
+def _notify_start(claim: Claim, plan: _Plan, damaged: int, notify: Notify) -> None:
     """Say what was found before the first round."""
     for remark in claim.remarks:
         notify(remark)
-    if reader.damaged:
-        notify(f"{reader.damaged} damaged lines in the shards are left out, their units run again")
+    if damaged:
+        notify(f"{damaged} damaged lines in the shards are left out, their units run again")
     if plan.known:
         notify(f"{plan.known} of {plan.planned} units are finished already")
-
-
-def on_rank_zero(communicator: Communicator, action: Callable[[], T]) -> T:
-    """What an action answers on rank 0, on every rank; an EtcError there is raised on every rank."""
-    answer: tuple[T | None, EtcError | None] = (None, None)
-    if communicator.rank == 0:
-        try:
-            answer = (action(), None)
-        except EtcError as error:
-            answer = (None, error)
-    answer = communicator.broadcast(answer)
-    if answer[1] is not None:
-        raise answer[1]
-    return cast(T, answer[0])

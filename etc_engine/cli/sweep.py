@@ -106,7 +106,7 @@ def _foretell(study: Path, output: Path, communicator: Communicator, realize: Re
     from functools import partial
 
     from etc_engine.batch.forecast import forecast
-    from etc_engine.batch.sweep import on_rank_zero
+    from etc_engine.batch.scheduler import on_rank_zero
 
     found = on_rank_zero(communicator, partial(forecast, study, output, communicator.size, realize))
     communicator.close()

@@ -78,7 +78,7 @@ PBS = {"STUDY": "study.toml", "OUTPUT": "out.nc"}
     ("script", "arguments", "variables", "call"),
     [
         ("local.sh", ("study.toml", "out.nc", "3"), {}, f"mpirun -n 3 {SWEEP}"),
-        ("slurm.sh", ("study.toml", "out.nc"), {}, f"srun --kill-on-bad-exit=0 {SWEEP}"),
+        ("slurm.sh", ("study.toml", "out.nc"), {}, f"srun --kill-on-bad-exit=1 {SWEEP}"),
         ("pbs.sh", (), PBS, f"mpiexec {SWEEP}"),
         ("slurm.sh", ("study.toml", "out.nc"), {"ETC_LAUNCHER": "mpirun -n 2"}, f"mpirun -n 2 {SWEEP}"),
     ],

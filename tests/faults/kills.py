@@ -139,10 +139,10 @@ class _Sweep:
 
     def records(self) -> dict[Unit, bytes]:
         """The bits of all finished units."""
-        found = ShardReader(shard_folder(self.output)).read() if not self.output.exists() else {}
+        reader = ShardReader(shard_folder(self.output))
         return {
-            unit: b"".join(cell.conductivity.tobytes() for row in record.result.cells for cell in row)
-            for unit, record in found.items()
+            record.unit: b"".join(cell.conductivity.tobytes() for row in record.result.cells for cell in row)
+            for record in reader.read(reader.files())
         }
 
     def computed(self) -> int:

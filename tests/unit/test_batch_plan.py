@@ -54,9 +54,11 @@ def test_streams_of_neighbours_are_not_correlated():
 
 
 def test_largest_units_come_first_and_finished_ones_not_at_all():
-    units = units_to_run({0.6: 2, 0.8: 3}, [Unit(0.8, 1), Unit(0.9, 0)])
-    assert units == [Unit(0.8, 0), Unit(0.8, 2), Unit(0.6, 0), Unit(0.6, 1)]
-    assert units_to_run({None: 2}, []) == [Unit(None, 0), Unit(None, 1)]
+    none = np.empty((0, 2), np.int64)
+    finished = np.array([[1, 1], [1, 7]])  # one beyond the target, of a former run
+    assert units_to_run((0.6, 0.8), (2, 3), finished).tolist() == [[1, 0], [1, 2], [0, 0], [0, 1]]
+    assert units_to_run((None,), (2,), none).tolist() == [[0, 0], [0, 1]]
+    assert units_to_run((0.6, 0.8), (2, 2), np.argwhere(np.ones((2, 2)))).size == 0
 
 
 samples = st.lists(st.floats(0.1, 10.0), min_size=2, max_size=20)

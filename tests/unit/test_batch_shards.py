@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from etc_engine.batch.plan import Unit
 from etc_engine.batch.records import Record, decode, encode, failed_realization
 from etc_engine.batch.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
+from etc_engine.batch.study import parse_study
+from etc_engine.batch.table import join, tabulate
 from etc_engine.errors import OutputError
 from etc_engine.realization import Cell, Realization, Status
 
@@ -20,6 +22,29 @@ def record(realization: int, value: float = 0.3, message: str = "") -> Record:
     cell = Cell(Status.OK, message, np.array([[value, np.nan], [np.nan, -value]]), 5, 2, 3.3, 7, 9, 1e-12, 0.5)
     result = Realization(11, 0.7, 0.69, 0.25, ((cell, cell), (cell, cell)))
     return Record(Unit(0.7, realization), result, 3, "node", 1.5, 2.5)
+
+
+STUDY = parse_study("""
+schema = 1
+name = "shards"
+seed = 20261
+[packing]
+radii = "uniform:0.01:0.02"
+box = [1.0, 1.0]
+density = 0.7
+[contacts]
+rule = "bonded"
+contact_angle = [2.5, 5.0]
+[conduction]
+method = ["chord", "standard"]
+[statistics]
+realizations = 3
+""")
+
+
+def read(folder) -> list[Record]:
+    reader = ShardReader(folder)
+    return reader.read(reader.files())
 
 
 def bits(found: Record) -> bytes:
@@ -59,9 +84,9 @@ def test_what_is_written_is_read_from_many_ranks_and_in_pieces(tmp_path):
     with ShardWriter(tmp_path, "run", 0) as zero, ShardWriter(tmp_path, "run", 1) as one:
         zero.append(record(0))
         one.append(record(1))
-        assert set(reader.read()) == {Unit(0.7, 0), Unit(0.7, 1)}
+        assert [r.unit for r in reader.read(reader.files())] == [Unit(0.7, 0), Unit(0.7, 1)]
         zero.append(record(2))
-        assert set(reader.read()) == {Unit(0.7, r) for r in range(3)}
+        assert [r.unit for r in reader.read(reader.files())] == [Unit(0.7, 2)]
     assert reader.damaged == 0
 
 
@@ -79,7 +104,7 @@ def test_a_shard_is_cut_at_every_length_without_losing_a_whole_line(tmp_path):
     ends = [i + 1 for i, byte in enumerate(data) if byte == ord("\n")]
     for length in range(0, len(data) + 1, 7):
         writer.path.write_bytes(data[:length])
-        assert len(ShardReader(tmp_path).read()) == sum(end <= length for end in ends)
+        assert len(read(tmp_path)) == sum(end <= length for end in ends)
 
 
 @settings(max_examples=100, deadline=None)
@@ -98,15 +123,34 @@ def test_damaged_lines_are_counted_and_the_others_kept(tmp_path):
     data[data.index(b"\n") + 40] ^= 1
     writer.path.write_bytes(data)
     reader = ShardReader(tmp_path)
-    assert set(reader.read()) == {Unit(0.7, 0), Unit(0.7, 2)}
+    assert [r.unit for r in reader.read(reader.files())] == [Unit(0.7, 0), Unit(0.7, 2)]
     assert reader.damaged == 1
 
 
-def test_of_a_unit_run_twice_the_first_file_counts(tmp_path):
-    for run, value in (("20260101", 0.1), ("20260102", 0.2)):
+def test_a_unit_run_twice_is_kept_once(tmp_path):
+    for run in ("20260101", "20260102"):
         with ShardWriter(tmp_path, run, 0) as writer:
-            writer.append(record(0, value))
-    assert ShardReader(tmp_path).read()[Unit(0.7, 0)].result.cells[0][0].conductivity[0, 0] == 0.1
+            writer.append(record(0))
+            writer.append(record(1))
+    table = join([tabulate(STUDY, read(tmp_path)), tabulate(STUDY, [record(1), record(2)])])
+    assert table.units.tolist() == [[0, 0], [0, 1], [0, 2]]
+
+
+def test_the_order_of_shards_only_grows(tmp_path):
+    reader = ShardReader(tmp_path)
+    names = ["m", "z", "a"]
+    for count, name in enumerate(names, start=1):
+        with ShardWriter(tmp_path, name, 0) as writer:
+            writer.append(record(count))
+        assert [path.name[0] for path in reader.files()] == names[:count]
+
+
+def test_a_table_holds_what_the_records_say():
+    table = tabulate(STUDY, [record(2, 0.25, "a remark"), record(0, 0.5)])
+    assert table.units.tolist() == [[0, 0], [0, 2]]
+    assert table.rows["conductivity"][:, 1, 0, 1, 1].tolist() == [-0.5, -0.25]
+    assert table.rows["worker_host"].tolist() == ["node", "node"]
+    assert set(table.messages) == {(0, 2, a, m) for a in (0, 1) for m in (0, 1)}
 
 
 def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, monkeypatch):
@@ -119,7 +163,7 @@ def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, monkeypatch):
         monkeypatch.undo()
         writer.append(record(2))
     reader = ShardReader(tmp_path)
-    assert set(reader.read()) == {Unit(0.7, 0), Unit(0.7, 2)}
+    assert [r.unit for r in reader.read(reader.files())] == [Unit(0.7, 0), Unit(0.7, 2)]
     assert reader.damaged == 0
 
 
