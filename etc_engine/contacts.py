@@ -200,6 +200,51 @@ def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float
     )
 
 
+def coordination_contacts(packing: ParticlePacking, half_angle: float, coordination: float) -> ContactNetwork:
+    """Bonded contacts of the closest pairs, as many as give a mean coordination number.
+
+    The bond gap is the relative gap of the (Z n / 2)-th closest pair.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+    half_angle : float [rad]
+        Half-angle of every contact arc.
+    coordination : float
+        Mean coordination number Z wanted, met to the nearest contact.
+
+    Returns
+    -------
+    ContactNetwork
+        Walls are bonded within the same gap.
+
+    Raises
+    ------
+    InputError
+        If Z is not positive, or there are not as many pairs within two mean radii.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> packing = ParticlePacking([[0.2, 0.5], [0.5, 0.5], [0.9, 0.5]], [0.1] * 3, Box((1.0, 1.0)))
+    >>> coordination_contacts(packing, 0.1, 2 / 3).pairs.tolist()
+    [[0, 1]]
+    """
+    wanted = round(0.5 * coordination * packing.count) if np.isfinite(coordination) else 0
+    if wanted < 1:
+        raise InputError(f"the mean coordination number must be positive (at least one contact), found {coordination}")
+    for reach in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0):
+        near = neighbor_pairs(packing, relative_gap=reach)
+        if near.count >= wanted:
+            relative = near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))
+            gap = float(np.partition(relative, wanted - 1)[wanted - 1])
+            return bonded_contacts(packing, half_angle, max(gap, 0.0) * (1.0 + 1e-12))
+    raise InputError(
+        f"a mean coordination number of {coordination:g} is out of reach: only {near.count} pairs of "
+        f"{packing.count} particles are closer than two mean radii, {wanted} are needed"
+    )
+
+
 def _check_half_angle(half_angle: float) -> None:
     if not (np.isfinite(half_angle) and 0.0 < half_angle < 0.5 * np.pi):
         raise InputError(

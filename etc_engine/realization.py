@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.contacts import ContactNetwork, bonded_contacts, overlap_contacts
+from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.dtem.methods import METHODS as DTEM_METHODS
 from etc_engine.effective import effective_conductivity, find_backbones, mean_field_conductivity
 from etc_engine.errors import ConvergenceError, EtcError, InputError, PackingError
@@ -39,7 +39,7 @@ class ContactSpec:
     rule : str
         ``overlap``, ``bonded`` or ``coordination``.
     contact_angles : tuple of float [rad]
-        Half-angles of bonded contacts, one cell each; empty with ``overlap``, where geometry sets them.
+        Half-angles of prescribed contacts, one cell each; empty with ``overlap``, where geometry sets them.
     bond_gap : float
         Largest bonded gap, in mean radii of the pair.
     coordination : float, optional
@@ -210,7 +210,9 @@ def contact_network(packing: ParticlePacking, contacts: ContactSpec) -> ContactN
         return overlap_contacts(packing)
     if contacts.rule == "bonded":
         return bonded_contacts(packing, contacts.contact_angles[0], contacts.bond_gap)
-    raise InputError(f"unknown contact rule {contacts.rule!r}: expected overlap or bonded")
+    if contacts.rule == "coordination":
+        return coordination_contacts(packing, contacts.contact_angles[0], contacts.coordination or np.nan)
+    raise InputError(f"unknown contact rule {contacts.rule!r}: expected overlap, bonded or coordination")
 
 
 def _dtem_cell(

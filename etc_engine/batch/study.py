@@ -124,12 +124,10 @@ class ContactsTable(_Table):
 
     @model_validator(mode="after")
     def _check(self) -> ContactsTable:
-        if (self.rule == "bonded") != (self.contact_angle is not None):
-            raise ValueError(
-                "rule = 'bonded' needs contact_angle, a list of half-angles in degrees"
-                if self.rule == "bonded"
-                else f"contact_angle has no meaning with rule = {self.rule!r}: take it out, or set rule = 'bonded'"
-            )
+        if self.rule == "overlap" and self.contact_angle is not None:
+            raise ValueError("contact_angle has no meaning with rule = 'overlap': take it out, or set rule = 'bonded'")
+        if self.rule != "overlap" and self.contact_angle is None:
+            raise ValueError(f"rule = {self.rule!r} needs contact_angle, a list of half-angles in degrees")
         if (self.rule == "coordination") != (self.coordination is not None):
             raise ValueError("coordination, the mean number wanted, goes with rule = 'coordination' and only with it")
         return self
@@ -278,7 +276,7 @@ class Study(_Table):
                 count=packing.count,
                 density=density,
                 growth_rate=packing.growth_rate,
-                radius_growth=contacts.rule != "bonded",
+                radius_growth=contacts.rule == "overlap",
             ),
             contacts=ContactSpec(
                 rule=contacts.rule,

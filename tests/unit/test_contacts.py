@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
+from etc_engine.contacts import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.packing.particles import ParticlePacking
 
@@ -76,3 +76,21 @@ def test_bonded_half_angles_out_of_range_are_refused(angle):
 def test_bad_bond_gaps_are_refused(gap):
     with pytest.raises(InputError, match="bond gap"):
         bonded_contacts(ParticlePacking([[0.5, 0.5]], [0.1], UNIT), 0.1, gap)
+
+
+@pytest.mark.parametrize("wanted", [2.0, 3.5, 4.0])
+def test_closest_pairs_give_the_coordination_number_wanted(wanted):
+    rng = np.random.default_rng(51)
+    centers = rng.random((300, 2))
+    packing = ParticlePacking(centers, rng.uniform(0.001, 0.003, 300), Box((1.0, 1.0), (True, True)))
+    with pytest.raises(InputError, match="out of reach"):
+        coordination_contacts(packing, 0.1, wanted)
+    bigger = packing.with_radii(packing.radii * 8.0)
+    network = coordination_contacts(bigger, 0.1, wanted)
+    assert network.coordination == pytest.approx(wanted, abs=1.0 / 300)
+
+
+@pytest.mark.parametrize("wanted", [0.0, -1.0, np.nan, np.inf])
+def test_senseless_coordination_numbers_are_refused(wanted):
+    with pytest.raises(InputError, match="coordination number must be positive"):
+        coordination_contacts(ParticlePacking([[0.5, 0.5]], [0.1], UNIT), 0.1, wanted)
