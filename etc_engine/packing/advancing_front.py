@@ -15,7 +15,7 @@ from etc_engine.packing.radii import RadiusDistribution
 RETRIES = 4
 """How often an edge too wide for the radius at hand waits for another radius."""
 
-WALL_DEPTH = 0.3
+WALL_DEPTH = 0.5
 """A disk that would cross a wall by less than this times its radius waits; by more, it goes to the wall."""
 
 OVERLAP = 1e-12
