@@ -1,5 +1,6 @@
 """Simulated conductivities against closed-form models: differences, bounds, and fits over a sweep."""
 
+from etc_engine.comparison.convergence import running_statistics, samples, system_sizes
 from etc_engine.comparison.evaluation import DEFAULT_MODELS, evaluate_models, model_curve, model_lines
 from etc_engine.comparison.fits import Fit, Parameter, fit_models
 from etc_engine.comparison.simulation import Phases, half_trace, phases, simulated
@@ -15,5 +16,8 @@ __all__ = [
     "model_curve",
     "model_lines",
     "phases",
+    "running_statistics",
+    "samples",
     "simulated",
+    "system_sizes",
 ]

@@ -1,8 +1,19 @@
 """Pictures of packings, fields and results; the only importer of matplotlib (extra ``plot``)."""
 
-from etc_engine.figures.canvas import save
+from etc_engine.figures.canvas import png, save
 from etc_engine.figures.comparison import draw_comparison, save_comparison
+from etc_engine.figures.convergence import draw_convergence, draw_histograms, draw_system_sizes
 from etc_engine.figures.field import save_field
 from etc_engine.figures.packing import save_packing
 
-__all__ = ["draw_comparison", "save", "save_comparison", "save_field", "save_packing"]
+__all__ = [
+    "draw_comparison",
+    "draw_convergence",
+    "draw_histograms",
+    "draw_system_sizes",
+    "png",
+    "save",
+    "save_comparison",
+    "save_field",
+    "save_packing",
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,13 @@ def save(figure: Figure, path: Path | str) -> None:
         figure.savefig(path, format=ending, dpi=200)
     except OSError as error:
         raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+
+
+def png(figure: Figure, dpi: int = 130) -> bytes:
+    """A figure as the bytes of a PNG file, for a page that holds its pictures itself."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi)
+    return buffer.getvalue()
 
 
 def spread(heights: Sequence[float], gap: float, low: float, high: float) -> list[float]:
