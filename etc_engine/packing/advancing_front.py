@@ -146,9 +146,7 @@ def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) ->
             f"{box.periodic_axes!r}: use lubachevsky-stillinger"
         )
     if 2.0 * sizes.max() > min(box.lengths):
-        raise InputError(
-            f"a disk of radius {sizes.max():g} is wider than the box {box.lengths}: use smaller radii"
-        )
+        raise InputError(f"a disk of radius {sizes.max():g} is wider than the box {box.lengths}: use smaller radii")
     grids = cell_grids(sizes, box)
     direction = rng.uniform(0.0, 2.0 * np.pi)
     from_the_middle = sizes.size > 1 and 4.0 * (sizes[0] + sizes[1]) < min(box.lengths)
@@ -156,9 +154,7 @@ def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) ->
     if from_the_middle and not _touches_all_walls(centers, sizes, box):
         centers = _fill(sizes, grids, direction, False, RETRIES, WALL_DEPTH)
     if not _touches_all_walls(centers, sizes, box):
-        raise PackingError(
-            f"the box {box.lengths} is too small for these radii: not every wall could be touched"
-        )
+        raise PackingError(f"the box {box.lengths} is too small for these radii: not every wall could be touched")
     return centers
 
 
@@ -169,7 +165,7 @@ def _touches_all_walls(centers: NDArray[np.float64], sizes: NDArray[np.float64],
 
 
 @njit(cache=True)
-def _tangent_to_disks(ax, ay, ra, bx, by, rb, r):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _tangent_to_disks(ax, ay, ra, bx, by, rb, r):  # type: ignore[no-untyped-def]
     """Centre of the disk of radius r tangent to disks a and b, left of a -> b."""
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
@@ -182,7 +178,7 @@ def _tangent_to_disks(ax, ay, ra, bx, by, rb, r):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _tangent_to_wall(ax, ay, ra, wall, outwards, r, lx, ly):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _tangent_to_wall(ax, ay, ra, wall, outwards, r, lx, ly):  # type: ignore[no-untyped-def]
     """Centre of the disk of radius r tangent to disk a and a wall, left of disk -> wall (or wall -> disk).
 
     Walls are numbered 0: x = 0, 1: x = lx, 2: y = 0, 3: y = ly.
@@ -201,7 +197,7 @@ def _tangent_to_wall(ax, ay, ra, wall, outwards, r, lx, ly):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]
     """Centre of the disk of radius r tangent to objects a and b; objects from sizes.size on are walls."""
     wall_a, wall_b = a - sizes.size, b - sizes.size
     if wall_a < 0 and wall_b < 0:
@@ -217,7 +213,7 @@ def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _overlap(j, r, cx, cy, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _overlap(j, r, cx, cy, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]
     """Depth by which a disk of radius r at (cx, cy) overlaps object j; negative if it does not."""
     if j < sizes.size:
         return r + sizes[j] - np.sqrt((x[j] - cx) ** 2 + (y[j] - cy) ** 2)
@@ -228,15 +224,12 @@ def _overlap(j, r, cx, cy, x, y, sizes, lx, ly):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # type: ignore[no-untyped-def]
     """Collect in `hits` the objects, other than a and b, that a disk of radius r at (cx, cy) overlaps."""
     _, cells, first_cell, largest, lengths, periodic = grids
     count = 0
     for wall in range(sizes.size, sizes.size + 4):
-        if (
-            wall not in (a, b)
-            and _overlap(wall, r, cx, cy, x, y, sizes, lengths[0], lengths[1]) > OVERLAP * r
-        ):
+        if wall not in (a, b) and _overlap(wall, r, cx, cy, x, y, sizes, lengths[0], lengths[1]) > OVERLAP * r:
             hits[count] = wall
             count += 1
     for k in range(largest.size):
@@ -260,7 +253,7 @@ def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # t
 
 
 @njit(cache=True)
-def _first_hit(a, b, r, x, y, sizes, lx, ly, hits, count):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _first_hit(a, b, r, x, y, sizes, lx, ly, hits, count):  # type: ignore[no-untyped-def]
     """Of the objects hit, the first one met by a disk that grows between a and b up to radius r.
 
     The triangle of a, b and that object is empty: hits make as few edges as a triangulation has.
@@ -296,7 +289,7 @@ def _append(queue, end, a, b, tries):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915, PLR0917
+def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # type: ignore[no-untyped-def]  # noqa: PLR0915
     """Place disks of the given sizes, in their order, until no edge of the front takes the next one.
 
     Edges wait in three places: `pending` (last in, first out) holds the edges to be tried at once with the

@@ -128,8 +128,7 @@ def _advancing_front(spec: PackingSpec, rng: np.random.Generator, _: Progress | 
     if spec.count is not None:
         if spec.count > packing.count:
             raise PackingError(
-                f"{spec.count} disks were asked for and the box holds {packing.count}: "
-                "use a smaller count or radius",
+                f"{spec.count} disks were asked for and the box holds {packing.count}: use a smaller count or radius",
                 reached=packing.density,
             )
         return packing.select(np.sort(rng.permutation(packing.count)[: spec.count]))
@@ -155,18 +154,12 @@ def _given_disks(spec: PackingSpec, rng: np.random.Generator) -> ParticlePacking
     raise PackingError(f"{spec.count} disks could not be placed in the box {spec.box.lengths}")
 
 
-def _lubachevsky_stillinger(
-    spec: PackingSpec, rng: np.random.Generator, progress: Progress | None
-) -> ParticlePacking:
+def _lubachevsky_stillinger(spec: PackingSpec, rng: np.random.Generator, progress: Progress | None) -> ParticlePacking:
     sizes = _scaled_sizes(spec, rng)
-    return compress(
-        sizes, spec.box, rng, density=spec.density, growth_rate=spec.growth_rate, progress=progress
-    ).packing
+    return compress(sizes, spec.box, rng, density=spec.density, growth_rate=spec.growth_rate, progress=progress).packing
 
 
-def _random_sequential(
-    spec: PackingSpec, rng: np.random.Generator, progress: Progress | None
-) -> ParticlePacking:
+def _random_sequential(spec: PackingSpec, rng: np.random.Generator, progress: Progress | None) -> ParticlePacking:
     if spec.count is None and spec.density is None and not spec.radii.scalable:
         return insert_randomly(enough_radii(spec.radii, spec.box, rng), spec.box, rng, progress).packing
     sizes = np.sort(_scaled_sizes(spec, rng))[::-1]  # the largest first: small ones still find room later

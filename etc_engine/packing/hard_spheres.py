@@ -5,7 +5,7 @@ s_i and one scale for all. Every particle keeps its own clock and one event, its
 leaving the ball in which its neighbour list is valid.
 """
 
-# ruff: noqa: PLR0917 -- kernels take plain arrays: numba counts references to each member of a tuple it unpacks
+
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def _assign(times, partners, heap, place, i, j, time):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
-def _predict(  # type: ignore[no-untyped-def]  # noqa: PLR0912
+def _predict(  # type: ignore[no-untyped-def]
     i, now, scale, rate, state, anchor, times, partners, heap, place, lists, offsets, sizes, frame
 ):
     """Find and queue the next event of particle i, whose clock stands at `now`."""
@@ -221,9 +221,7 @@ def _collide(state, frame, i, j, scale, rate):  # type: ignore[no-untyped-def]
     rz -= frame[0, 2] * np.rint(rz * frame[1, 2])
     distance = np.sqrt(rx * rx + ry * ry + rz * rz)
     nx, ny, nz = rx / distance, ry / distance, rz / distance
-    approach = (
-        (state[j, 3] - state[i, 3]) * nx + (state[j, 4] - state[i, 4]) * ny + (state[j, 5] - state[i, 5]) * nz
-    )
+    approach = (state[j, 3] - state[i, 3]) * nx + (state[j, 4] - state[i, 4]) * ny + (state[j, 5] - state[i, 5]) * nz
     growth = (state[i, 7] + state[j, 7]) * rate
     # relative to the moving surfaces the approach speed changes its sign: half of the change for each
     kick = max(growth - approach, 1e-14 * abs(approach))

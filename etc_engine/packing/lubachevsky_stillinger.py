@@ -139,9 +139,7 @@ def compress(
     order = _spatial_order(centers, box)
     excursion = _excursion(radii * target, box)
     room = 24 if d == 2 else 60
-    gas = make_gas(
-        centers[order], rng.standard_normal((count, d)), radii[order], box, target, excursion, room
-    )
+    gas = make_gas(centers[order], rng.standard_normal((count, d)), radii[order], box, target, excursion, room)
     pressure, collisions, renewals = 1.0, 0, 0
     while True:
         energy = _cool(gas, box)
@@ -199,9 +197,7 @@ def _refuse_the_impossible(radii: NDArray[np.float64], box: Box, density: float 
     return goal
 
 
-def _refuse_to_stop_short(
-    packing: ParticlePacking, density: float | None, pressure: float, jammed: float
-) -> None:
+def _refuse_to_stop_short(packing: ParticlePacking, density: float | None, pressure: float, jammed: float) -> None:
     if density is None:
         return
     reached = packing.density

@@ -3,7 +3,7 @@
 The anchor of a particle is the ball it stays in, its own surface included, till its list is renewed: two
 particles whose balls do not meet cannot collide.
 """
-# ruff: noqa: PLR0917 -- kernels take plain arrays: numba counts references to each member of a tuple it unpacks
+
 
 from __future__ import annotations
 

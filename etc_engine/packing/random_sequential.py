@@ -205,7 +205,7 @@ def _try_what_is_left(
 
 
 @njit(cache=True)
-def _is_free(x, y, z, radius, centers, sizes, grids, heads, following):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _is_free(x, y, z, radius, centers, sizes, grids, heads, following):  # type: ignore[no-untyped-def]
     """Whether a particle of this radius at this place overlaps none of those placed."""
     _, cells, first_cell, largest, lengths, periodic = grids
     for k in range(largest.size):
@@ -234,7 +234,7 @@ def _is_free(x, y, z, radius, centers, sizes, grids, heads, following):  # type:
 
 
 @njit(cache=True)
-def _try_points(sizes, grids, heads, following, centers, points, d, placed, failures, most):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _try_points(sizes, grids, heads, following, centers, points, d, placed, failures, most):  # type: ignore[no-untyped-def]
     """Use up a block of trial points: number of particles placed, and failures in a row at the end."""
     lengths, periodic = grids.lengths, grids.periodic
     for m in range(len(points)):
@@ -256,7 +256,7 @@ def _try_points(sizes, grids, heads, following, centers, points, d, placed, fail
 
 
 @njit(cache=True)
-def _uncovered(sizes, grids, heads, following, centers, corners, width, radius, d):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+def _uncovered(sizes, grids, heads, following, centers, corners, width, radius, d):  # type: ignore[no-untyped-def]
     """Which voxels may hold the centre of one more particle: those that no exclusion zone covers whole."""
     _, cells, first_cell, largest, lengths, periodic = grids
     free = np.ones(len(corners), dtype=np.bool_)
@@ -275,9 +275,7 @@ def _uncovered(sizes, grids, heads, following, centers, corners, width, radius, 
             for cx in range(x0, min(x1, x0 + cells[k, 0] - 1) + 1):
                 for cy in range(y0, min(y1, y0 + cells[k, 1] - 1) + 1):
                     for cz in range(z0, min(z1, z0 + cells[k, 2] - 1) + 1):
-                        c = ((cx % cells[k, 0]) * cells[k, 1] + cy % cells[k, 1]) * cells[k, 2] + cz % cells[
-                            k, 2
-                        ]
+                        c = ((cx % cells[k, 0]) * cells[k, 1] + cy % cells[k, 1]) * cells[k, 2] + cz % cells[k, 2]
                         j = heads[first_cell[k] + c]
                         while j >= 0 and free[m]:
                             dx, dy, dz = x - centers[j, 0], y - centers[j, 1], z - centers[j, 2]
@@ -287,9 +285,7 @@ def _uncovered(sizes, grids, heads, following, centers, corners, width, radius, 
                                 dy -= lengths[1] * np.rint(dy / lengths[1])
                             if periodic[2]:
                                 dz -= lengths[2] * np.rint(dz / lengths[2])
-                            far = (
-                                (abs(dx) + half[0]) ** 2 + (abs(dy) + half[1]) ** 2 + (abs(dz) + half[2]) ** 2
-                            )
+                            far = (abs(dx) + half[0]) ** 2 + (abs(dy) + half[1]) ** 2 + (abs(dz) + half[2]) ** 2
                             free[m] = far >= (radius + sizes[j]) ** 2
                             j = following[j]
     return free

@@ -32,9 +32,7 @@ def contact_value(dimension, phi):
     return (1.0 - phi / 2.0) / (1.0 - phi) ** 3
 
 
-@pytest.mark.parametrize(
-    ("dimension", "phi"), [(2, 0.2), (2, 0.45), (2, 0.6), (3, 0.15), (3, 0.3), (3, 0.45)]
-)
+@pytest.mark.parametrize(("dimension", "phi"), [(2, 0.2), (2, 0.45), (2, 0.6), (3, 0.15), (3, 0.3), (3, 0.45)])
 def test_collision_rate_and_pressure_of_the_fluid(dimension, phi):
     count, rng = 2000, np.random.default_rng(517)
     box = Box((1.0,) * dimension, (True,) * dimension)
@@ -58,9 +56,7 @@ def test_collision_rate_and_pressure_of_the_fluid(dimension, phi):
     assert pressure == pytest.approx(1.0 + 2.0 ** (dimension - 1) * phi * chi, rel=0.015)
 
 
-@pytest.mark.parametrize(
-    ("dimension", "word", "published"), [(2, "bidisperse:1:1.4:0.5", 0.842), (3, "equal", 0.639)]
-)
+@pytest.mark.parametrize(("dimension", "word", "published"), [(2, "bidisperse:1:1.4:0.5", 0.842), (3, "equal", 0.639)])
 def test_random_close_packing(dimension, word, published):
     rng = np.random.default_rng(523)
     radii = parse_radii(word).sample(1500, rng)
@@ -81,9 +77,7 @@ def test_random_sequential_saturation(dimension, count, published):
     measure = published / count
     radius = (measure / np.pi) ** 0.5 if dimension == 2 else (0.75 * measure / np.pi) ** (1.0 / 3.0)
     box = Box((1.0,) * dimension, (True,) * dimension)
-    made = [
-        insert_randomly(np.full(2 * count, radius), box, np.random.default_rng(600 + k)) for k in range(8)
-    ]
+    made = [insert_randomly(np.full(2 * count, radius), box, np.random.default_rng(600 + k)) for k in range(8)]
     assert all(insertion.saturated for insertion in made)
     densities = np.array([insertion.packing.density for insertion in made])
     standard_error = densities.std(ddof=1) / np.sqrt(densities.size)

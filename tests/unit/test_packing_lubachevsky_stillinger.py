@@ -44,7 +44,7 @@ def brute_force_overlap(packing):
     flags=st.tuples(st.booleans(), st.booleans(), st.booleans()),
     part=st.floats(0.3, 1.0),
 )
-def test_density_is_exact_and_nothing_overlaps(seed, dimension, count, word, flags, part):  # noqa: PLR0917
+def test_density_is_exact_and_nothing_overlaps(seed, dimension, count, word, flags, part):
     rng = np.random.default_rng(seed)
     box = Box((1.0, 1.3, 0.9)[:dimension], flags[:dimension])
     density = part * (0.70 if dimension == 2 else 0.42)

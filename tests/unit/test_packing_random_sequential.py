@@ -50,9 +50,7 @@ def test_a_saturated_packing_has_no_place_left():
 def test_saturation_is_reported_with_what_was_reached():
     box = Box((1.0, 1.0))
     with pytest.raises(PackingError, match=r"saturated at density 0\.5") as refusal:
-        pack(
-            PackingSpec("random-sequential", parse_radii("equal"), box, 500, 0.6), np.random.default_rng(231)
-        )
+        pack(PackingSpec("random-sequential", parse_radii("equal"), box, 500, 0.6), np.random.default_rng(231))
     assert 0.5 < refusal.value.reached < 0.6
 
 
