@@ -5,8 +5,6 @@ s_i and one scale for all. Every particle keeps its own clock and one event, its
 leaving the ball in which its neighbour list is valid.
 """
 
-
-
 from __future__ import annotations
 
 from typing import NamedTuple

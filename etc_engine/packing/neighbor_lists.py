@@ -4,7 +4,6 @@ The anchor of a particle is the ball it stays in, its own surface included, till
 particles whose balls do not meet cannot collide.
 """
 
-
 from __future__ import annotations
 
 import numpy as np
