@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.packing.structure import solid_fraction, union_area
+from etc_engine.packing.structure import solid_fraction, union_area, union_volume
 
 
 def lens(d, r, s):
@@ -84,6 +84,73 @@ def test_translation_and_order_do_not_matter():
     assert union_area(moved) == pytest.approx(area, rel=1e-12)
 
 
-def test_three_dimensions_are_refused():
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.3])
+@pytest.mark.parametrize(("d", "r", "s"), [(0.3, 0.2, 0.2), (0.3, 0.25, 0.1), (0.2, 0.25, 0.1), (0.349, 0.25, 0.1)])
+def test_two_spheres(d, r, s, angle):
+    step = d * np.array((np.cos(angle) * 0.8, np.sin(angle) * 0.8, 0.6))
+    centers = [[0.4, 0.4, 0.4], [0.4, 0.4, 0.4] + step]
+    common = np.pi * (r + s - d) ** 2 * (d * d + 2 * d * (r + s) - 3 * (r - s) ** 2) / (12 * d)
+    expected = 4 / 3 * np.pi * (r**3 + s**3) - common
+    assert union_volume(ParticlePacking(centers, [r, s], Box((1.0, 1.0, 1.0)))) == pytest.approx(expected, rel=1e-10)
+
+
+def test_three_equal_spheres_by_inclusion_and_exclusion():
+    """Unit spheres on an equilateral triangle of side 1; their common part is summed over its cross-sections.
+
+    At height z the three disks of radius rho have their centres at 1 / sqrt(3) from the middle; their common part
+    is an equilateral triangle with corners where two circles meet, and three circular segments on its sides.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    height = np.sqrt(2.0 / 3.0)  # of the two points that lie on all three spheres
+    rho = np.sqrt(1.0 - (0.5 * height * (nodes + 1.0)) ** 2)
+    corner = np.sqrt(rho**2 - 0.25) - 0.5 / np.sqrt(3.0)  # from the middle to where two circles meet
+    side = np.sqrt(3.0) * corner
+    opening = 2.0 * np.arcsin(side / (2.0 * rho))
+    section = np.sqrt(3.0) / 4.0 * side**2 + 1.5 * rho**2 * (opening - np.sin(opening))
+    common_to_three = height * np.sum(weights * section)
+    common_to_two = np.pi * (4.0 + 1.0) * (2.0 - 1.0) ** 2 / 12.0
+    expected = 4.0 * np.pi - 3.0 * common_to_two + common_to_three
+    centers = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, np.sqrt(3.0) / 2.0, 0.0]]) + 2.0
+    assert union_volume(ParticlePacking(centers, [1.0] * 3, Box((6.0,) * 3))) == pytest.approx(expected, rel=1e-7)
+
+
+def test_sphere_in_walls_and_corners():
+    box = Box((2.0, 1.0, 1.0))
+    cap = np.pi * 0.2**2 * (3 * 0.3 - 0.2) / 3
+    for center in ([1.0, 0.5, 0.1], [1.0, 0.9, 0.5], [0.1, 0.4, 0.5]):
+        assert union_volume(ParticlePacking([center], [0.3], box)) == pytest.approx(
+            4 / 3 * np.pi * 0.027 - cap, rel=1e-11
+        )
+    corner = ParticlePacking([[2.0, 1.0, 0.0]], [0.4], box)
+    assert union_volume(corner) == pytest.approx(np.pi * 0.4**3 / 6, rel=1e-11)
+    assert solid_fraction(ParticlePacking([[1.0, 0.5, 0.5]], [3.0], box)) == pytest.approx(1.0, rel=1e-11)
+    twice = ParticlePacking([[1.0, 0.5, 0.5]] * 2 + [[1.02, 0.5, 0.5]], [0.3, 0.3, 0.1], box)
+    assert union_volume(twice) == pytest.approx(4 / 3 * np.pi * 0.027, rel=1e-11)
+
+
+def test_sphere_that_overlaps_its_own_images():
+    packing = ParticlePacking([[0.1, 0.7, 0.3]], [0.55], Box((1.0, 1.0, 1.0), (True,) * 3))
+    cap = np.pi * 0.05**2 * (3 * 0.55 - 0.05) / 3
+    assert union_volume(packing) == pytest.approx(4 / 3 * np.pi * 0.55**3 - 6 * cap, rel=1e-11)
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(100, 10**6), count=st.integers(2, 40), flags=st.tuples(*[st.booleans()] * 3))
+def test_monte_carlo_agrees_in_space(seed, count, flags):
+    rng = np.random.default_rng(seed)
+    box = Box((1.3, 0.8, 1.0), flags)
+    packing = ParticlePacking(rng.random((count, 3)) * box.lengths, 0.3 * rng.random(count) ** 2 + 0.05, box)
+    points = rng.random((20_000, 3)) * box.lengths
+    inside = np.zeros(len(points), dtype=bool)
+    for center, radius in zip(packing.centers, packing.radii, strict=True):
+        inside |= (box.minimum_image(points - center) ** 2).sum(axis=1) < radius**2
+    fraction = solid_fraction(packing)
+    standard_error = np.sqrt(fraction * (1 - fraction) / len(points)) + 1e-6
+    assert abs(inside.mean() - fraction) < 5 * standard_error
+
+
+def test_the_other_dimension_is_refused():
     with pytest.raises(InputError, match="2D box, found 3D"):
         union_area(ParticlePacking([[0.5, 0.5, 0.5]], [0.1], Box((1.0, 1.0, 1.0))))
+    with pytest.raises(InputError, match="3D box, found 2D"):
+        union_volume(ParticlePacking([[0.5, 0.5]], [0.1], Box((1.0, 1.0))))
