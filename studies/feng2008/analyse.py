@@ -54,7 +54,9 @@ def tables(output: Path) -> None:
         writer.writerow(["zone", "particles", *temperatures, "paper_standard", "paper_enhanced", "converged_truth"])
         for zone, (i, j) in enumerate(network.pairs):
             row = [f"{values[zone]:.6f}" for values in temperatures.values()]
-            paper = [published[name][zone] for name in ("paper_dtem_standard", "paper_dtem_enhanced", "converged_truth")]
+            paper = [
+                published[name][zone] for name in ("paper_dtem_standard", "paper_dtem_enhanced", "converged_truth")
+            ]
             writer.writerow([zone + 1, f"{i + 1}-{j + 1}", *row, *paper])
     solution = results["chord"].solutions[0]
     caption = f"12 particles, method chord: k = {results['chord'].tensor[0, 0]:.6f} W/(m K)"
