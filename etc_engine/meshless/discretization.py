@@ -60,7 +60,7 @@ class Discretization:
     spacing: Spacing = "chebyshev"
     basis: RadialBasis = PolyharmonicSpline(2)  # noqa: RUF009 - frozen, so one instance may be shared
     functions: int | None = None
-    source_offset: float = 0.25
+    source_offset: float = 0.4
     source_factor: float | None = None
     source_center: tuple[float, float] | None = None
     length_scale: float | None = None

@@ -48,18 +48,20 @@ class HelmholtzOperator:
     """Particular and homogeneous functions for one lambda, and the fitted boundary system.
 
     A field is a coefficient vector (alpha, beta, c): radial functions, monomials, then Trefftz functions
-    or sources. ``lam`` is lambda in scaled coordinates.
+    or sources. ``lam`` is lambda in scaled coordinates; ``particular_boundary`` gives B1 u + B2 du/dn of
+    the particular functions at the collocation points.
     """
 
     layout: Layout
     lam: complex
     interpolation: SourceInterpolation
+    particular_boundary: Field
     fit: BoundaryFit
 
     def solve(self, source: Field, data: Field) -> Field:
         """Coefficients of the solution for nodal values of f (scaled: scale^2 f) and boundary data B3."""
         particular = self.interpolation.coefficients(source)
-        gap = data - boundary_rows(self.layout, self.lam, self.layout.collocation)[0] @ particular
+        gap = data - self.particular_boundary @ particular
         return np.concatenate([particular, self.fit.solve(gap)])
 
     def value_rows(self, points: Array) -> Field:
@@ -84,7 +86,7 @@ def prepare_operator(layout: Layout, lam: complex, interpolation: SourceInterpol
     ConvergenceError
         If the boundary system holds values that are not finite or no singular value is usable.
     """
-    matrix = boundary_rows(layout, lam, layout.collocation)[1]
+    particular, matrix = boundary_rows(layout, lam, layout.collocation)
     b1, b2 = layout.boundary_coefficients(layout.collocation.edges)
     row_scale = np.abs(b1) + np.abs(b2) * (1.0 + abs(lam))
     matrix = matrix / row_scale[:, None]
@@ -100,7 +102,7 @@ def prepare_operator(layout: Layout, lam: complex, interpolation: SourceInterpol
         raise ConvergenceError("the boundary system has rank 0: the functions vanish at all boundary nodes")
     condition = float(values[0] / values[-1]) if values[-1] > 0.0 else np.inf
     fit = BoundaryFit(row_scale, left[:, kept], 1.0 / values[kept], right[kept], rank, condition)
-    return HelmholtzOperator(layout, lam, interpolation, fit)
+    return HelmholtzOperator(layout, lam, interpolation, particular, fit)
 
 
 def boundary_rows(layout: Layout, lam: complex, where: BoundaryNodes) -> tuple[Field, Field]:

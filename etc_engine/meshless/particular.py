@@ -81,8 +81,7 @@ def interpolate_source(basis: RadialBasis, nodes: Array, lam: complex = 0.0) -> 
     matrix[:n, :n] = phi
     matrix[:n, n:], matrix[n:, :n] = polynomial, polynomial.T
     norm = np.abs(matrix).sum(axis=0).max()
-    (getrf, gecon) = get_lapack_funcs(("getrf", "gecon"), (matrix,))
-    del getrf
+    gecon = get_lapack_funcs("gecon", (matrix,))
     factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
     reciprocal, _ = gecon(factors[0], norm)
     if reciprocal == 0.0 or not np.isfinite(reciprocal):

@@ -12,7 +12,6 @@ from scipy.special import digamma, k0, k1, kv
 from etc_engine.errors import InputError
 
 Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Field = NDArray  # float64 for a real lambda, complex128 on the Laplace contour
 
 #: Below this |lambda| x reach the growing (regular) particular solution is the better-scaled one.
@@ -20,6 +19,8 @@ SMALL_REACH = 2.0
 #: Below this |lambda| r the power series is summed; beyond it logarithms and K_0 are combined.
 SERIES_LIMIT = 1.0
 SERIES_TERMS = 14
+#: K_0(z) < 1e-17 for Re z beyond this.
+NEGLIGIBLE = 38.0
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,14 @@ class PolyharmonicSpline:
     Parameters
     ----------
     order : int
-        n, from 1 (thin-plate spline) to 4.
+        n, from 1 (thin-plate spline) to 5; orders beyond 3 lose their accuracy to rounding on fine nodes.
     degree : int, optional
         Degree of the polynomials; n by default (as conditional positive definiteness asks), -1 for none.
 
     Raises
     ------
     InputError
-        If the order is not 1 to 4 or the degree is not -1 to 6.
+        If the order is not 1 to 5 or the degree is not -1 to 6.
 
     Notes
     -----
@@ -66,8 +67,8 @@ class PolyharmonicSpline:
     degree: int | None = None
 
     def __post_init__(self) -> None:
-        if self.order not in (1, 2, 3, 4):
-            raise InputError(f"a polyharmonic spline of order 1, 2, 3 or 4 is expected, found {self.order}")
+        if self.order not in (1, 2, 3, 4, 5):
+            raise InputError(f"a polyharmonic spline of order 1 to 5 is expected, found {self.order}")
         degree = self.order if self.degree is None else self.degree
         if not -1 <= degree <= 6:
             raise InputError(f"the polynomial degree must lie between -1 (none) and 6, found {degree}")
@@ -187,8 +188,18 @@ def _combine(spline: PolyharmonicSpline, r: Array, lam: complex, reach: float, s
     return result
 
 
+def _bessel(order: int, z: Field) -> Field:
+    """K_0 or K_1, set to 0 where it is below 1e-17 (the complex routine is slow)."""
+    if not np.iscomplexobj(z):
+        return np.asarray(k0(z) if order == 0 else k1(z))
+    result = np.zeros_like(z)
+    counts = z.real < NEGLIGIBLE
+    result[counts] = kv(order, z[counts])
+    return np.asarray(result)
+
+
 def _closed_form(r: Array, lam: complex, n: int) -> Field:
-    bessel = k0(lam * r) if isinstance(lam, float) else kv(0, lam * r)
+    bessel = _bessel(0, lam * r)
     psi = -(4.0**n) * factorial(n) ** 2 / lam ** (2 * n + 2) * bessel
     log_r, square = np.log(r), r * r
     for k, (a, b) in enumerate(_iterated_laplacians(n)):
@@ -197,7 +208,7 @@ def _closed_form(r: Array, lam: complex, n: int) -> Field:
 
 
 def _closed_form_slope(r: Array, lam: complex, n: int) -> Field:
-    bessel = k1(lam * r) if isinstance(lam, float) else kv(1, lam * r)
+    bessel = _bessel(1, lam * r)
     psi = 4.0**n * factorial(n) ** 2 / lam ** (2 * n + 1) * bessel / r
     for k, (a, b) in enumerate(_iterated_laplacians(n)):
         psi -= _logarithmic_slope(r, n - k, a, b) / lam ** (2 * k + 2)
