@@ -51,6 +51,9 @@ class Discretization:
         without polynomials.
     rank_tolerance : float
         Singular values of the boundary system below this part of the largest are cut off.
+    residual_limit : float
+        A boundary residual above this part of the temperature span is worth a warning; data that jumps
+        along the boundary needs a larger one.
     allow_unstable : bool
         Go on (with a warning) when the time step operator amplifies; refused otherwise.
     """
@@ -65,6 +68,7 @@ class Discretization:
     source_center: tuple[float, float] | None = None
     length_scale: float | None = None
     rank_tolerance: float = 1e-14
+    residual_limit: float = 0.05
     allow_unstable: bool = False
 
     def __post_init__(self) -> None:
@@ -145,7 +149,7 @@ def lay_out(problem: HeatProblem, discretization: Discretization, method: Method
     functions = discretization.functions or max(1, collocation.count // OVERSAMPLING)
     if functions > collocation.count:
         raise InputError(
-            f"{functions} functions for {collocation.count} boundary nodes: expected at most one per boundary node"
+            f"{functions} functions for {collocation.count} boundary nodes: expected at most one per node"
         )
     sources = _place_sources(problem, discretization, functions, radius) if method == "mfs" else None
     return Layout(
@@ -173,16 +177,17 @@ def _collocation_nodes(problem: HeatProblem, discretization: Discretization) -> 
     collocation = node_layouts.boundary_nodes_at(problem.domain, np.asarray(boundary), fixed)
     missing = set(range(len(problem.boundary))) - set(collocation.edges.tolist())
     if missing:
-        raise InputError(f"no boundary node belongs to edge {min(missing)}: its condition would be lost; add some")
+        raise InputError(
+            f"no boundary node belongs to edge {min(missing)}: its condition would be lost; add some"
+        )
     return collocation
 
 
 def _check_nodes(problem: HeatProblem, collocation: BoundaryNodes) -> BoundaryNodes:
     """Points between the collocation points, where the boundary residual is measured."""
-    uniform = node_layouts.boundary_nodes(
+    return node_layouts.boundary_nodes(
         problem.domain, max(collocation.count + 7, 3 * len(problem.boundary)), "uniform"
     )
-    return uniform
 
 
 def _place_sources(
@@ -190,7 +195,9 @@ def _place_sources(
 ) -> Array:
     domain, boundary = problem.domain, discretization.boundary
     if isinstance(boundary, int | np.integer):
-        base = node_layouts.boundary_nodes(domain, max(functions, 3 * len(problem.boundary)), discretization.spacing)
+        base = node_layouts.boundary_nodes(
+            domain, max(functions, 3 * len(problem.boundary)), discretization.spacing
+        )
     else:
         base = _collocation_nodes(problem, discretization)
     if discretization.source_factor is not None:

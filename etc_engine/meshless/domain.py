@@ -88,7 +88,7 @@ class Polygon:
     @cached_property
     def edge_lengths(self) -> Array:
         """Edge lengths, shape (n,) [m]."""
-        return np.linalg.norm(self.edges, axis=1)
+        return np.asarray(np.linalg.norm(self.edges, axis=1))
 
     @property
     def corners(self) -> Array:
@@ -132,7 +132,7 @@ class Polygon:
 
     def nearest_edge(self, points: Array) -> NDArray[np.int64]:
         """The edge closest to each point (the first of equals)."""
-        return np.argmin(self.edge_distances(points), axis=1).astype(np.int64)
+        return np.asarray(np.argmin(self.edge_distances(points), axis=1), dtype=np.int64)
 
     def normals_at(self, points: Array, edges: NDArray[np.int64]) -> Array:  # noqa: ARG002
         """Outward normal at boundary points that belong to the given edges."""
@@ -162,7 +162,7 @@ class Polygon:
             b_ub=offset,
             bounds=[(None, None), (None, None), (0.0, None)],
         )
-        if not program.success or program.x[2] <= 1e-9 * self.edge_lengths.max():
+        if not program.success or program.x is None or program.x[2] <= 1e-9 * self.edge_lengths.max():
             return None
         return np.asarray(program.x[:2])
 
@@ -228,8 +228,8 @@ class Disk:
 
     Examples
     --------
-    >>> round(Disk((0.0, 0.0), 2.0, breaks=(0.0, 3.141592653589793)).edge_lengths[0], 6)
-    6.283185
+    >>> Disk((0.0, 0.0), 2.0, breaks=(0.0, 3.141592653589793)).edge_lengths.round(6)
+    array([6.283185, 6.283185])
     """
 
     center: tuple[float, float]
@@ -293,7 +293,7 @@ class Disk:
         x, y = (np.asarray(points) - self.center).T
         first, _ = self.spans
         turn = np.mod(np.arctan2(y, x) - first[0], TWO_PI)
-        return np.searchsorted(first - first[0], turn, side="right").astype(np.int64) - 1
+        return np.asarray(np.searchsorted(first - first[0], turn, side="right") - 1, dtype=np.int64)
 
     def normals_at(self, points: Array, edges: NDArray[np.int64]) -> Array:  # noqa: ARG002
         """Outward normal at boundary points."""
@@ -346,11 +346,13 @@ def _refuse_improper(vertices: Array) -> None:
         j = (i + 1) % n
         sine, cosine = _cross(edges[i], edges[j]), np.dot(edges[i], edges[j])
         if cosine < 0.0 and abs(sine) <= 1e-12 * lengths[i] * lengths[j]:
-            raise GeometryError(f"polygon edge {j} folds back on edge {i} at vertex {j}: found a corner of angle 0")
+            raise GeometryError(
+                f"polygon edge {j} folds back on edge {i} at vertex {j}: found a corner of angle 0"
+            )
         for k in range(i + 2, n if i else n - 1):
             if _segments_meet(vertices[i], edges[i], vertices[k], edges[k]):
                 raise GeometryError(
-                    f"polygon edges {i} and {k} touch or cross: list the vertices of a simple polygon in order"
+                    f"polygon edges {i} and {k} touch or cross: list the vertices of a simple polygon in turn"
                 )
 
 

@@ -81,8 +81,10 @@ def offset_sources(domain: Domain, points: Array, normals: Array, offset: float)
     clearance = domain.edge_distances(candidates).min(axis=1)
     kept = candidates[~domain.contains(candidates) & (clearance >= CROWDED * offset)]
     if len(kept) == 0:
-        raise GeometryError(f"no source fits outside the body at a distance of {offset:g} m: choose a smaller one")
-    return kept
+        raise GeometryError(
+            f"no source fits outside the body at a distance of {offset:g} m: choose a smaller one"
+        )
+    return np.asarray(kept)
 
 
 def factor_sources(domain: Domain, points: Array, factor: float, center: Array | None = None) -> Array:
@@ -103,7 +105,7 @@ def factor_sources(domain: Domain, points: Array, factor: float, center: Array |
             "the body is not star-shaped, so no centre keeps scaled sources outside: place them along the "
             "normals (source_offset) instead"
         )
-    return points + factor * (points - np.asarray(center, dtype=float))
+    return np.asarray(points + factor * (points - np.asarray(center, dtype=float)))
 
 
 def clearance_of_sources(domain: Domain, sources: Array, radius: float) -> Array:
@@ -120,8 +122,8 @@ def clearance_of_sources(domain: Domain, sources: Array, radius: float) -> Array
         first = int(np.flatnonzero(bad)[0])
         place = "on the boundary of" if clearance[first] <= ON_BOUNDARY * radius else "inside"
         raise GeometryError(
-            f"source {first} at {np.round(sources[first], 9).tolist()} lies {place} the body ({int(bad.sum())} of "
-            f"{len(sources)} do): sources must lie outside; move the centre into the star kernel or use an "
-            "offset along the normals"
+            f"source {first} at {np.round(sources[first], 9).tolist()} lies {place} the body "
+            f"({int(bad.sum())} of {len(sources)} do): sources must lie outside; move the centre into the "
+            "star kernel or use an offset along the normals"
         )
-    return clearance
+    return np.asarray(clearance)

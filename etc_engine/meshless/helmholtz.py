@@ -92,8 +92,8 @@ def prepare_operator(layout: Layout, lam: complex, interpolation: SourceInterpol
     matrix = matrix / row_scale[:, None]
     if not np.isfinite(matrix).all():
         raise ConvergenceError(
-            f"the boundary functions overflow at lambda = {lam:.4g} (in units of 1/{layout.scale:g} m): use longer "
-            "time steps or fewer functions"
+            f"the boundary functions overflow at lambda = {lam:.4g} (in units of 1/{layout.scale:g} m): use "
+            "longer time steps or fewer functions"
         )
     left, values, right = svd(matrix, full_matrices=False, check_finite=False)
     kept = values > layout.discretization.rank_tolerance * values[0]

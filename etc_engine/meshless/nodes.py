@@ -59,7 +59,7 @@ def boundary_nodes(domain: Domain, count: int, spacing: Spacing = "chebyshev") -
     _check_spacing(spacing)
     if count < 3 * len(lengths):
         raise InputError(
-            f"{count} boundary nodes are too few for {len(lengths)} edges: expected at least {3 * len(lengths)}"
+            f"{count} boundary nodes are too few for {len(lengths)} edges: give at least {3 * len(lengths)}"
         )
     shares = np.maximum(3, np.rint(count * lengths / lengths.sum()).astype(int))
     pieces = []
@@ -94,7 +94,9 @@ def boundary_nodes_at(domain: Domain, points: Array, dirichlet: NDArray[np.bool_
             f"boundary node {first} at {points[first].tolist()} is {gap[first]:.3g} m away from the boundary"
         )
     if isinstance(domain, Polygon):
-        edges = np.argmin(np.where(distances <= 1e-9 * size, np.where(dirichlet, 0.0, 1.0), 2.0 + distances), axis=1)
+        edges = np.argmin(
+            np.where(distances <= 1e-9 * size, np.where(dirichlet, 0.0, 1.0), 2.0 + distances), axis=1
+        )
     else:
         edges = domain.nearest_edge(points)
     return BoundaryNodes(points, domain.normals_at(points, edges), edges.astype(np.int64))
@@ -130,7 +132,9 @@ def _lattice(domain: Domain, step: float, margin: float) -> Array:
     grid = grid[domain.contains(grid)]
     grid = grid[domain.edge_distances(grid).min(axis=1) > max(margin, 1e-6 * step)] if len(grid) else grid
     if len(grid) == 0:
-        raise GeometryError(f"no node of a lattice with spacing {step:g} m falls inside the body: ask for more nodes")
+        raise GeometryError(
+            f"no node of a lattice with spacing {step:g} m falls inside the body: ask for more nodes"
+        )
     return np.asarray(grid)
 
 
@@ -168,13 +172,13 @@ def refuse_duplicates(points: Array) -> float:
     InputError
         If two nodes coincide: the interpolation matrix would be singular.
     """
-    distance, neighbour = cKDTree(points).query(points, k=2)
+    distance, neighbour = (np.asarray(found) for found in cKDTree(points).query(points, k=2))
     gap = distance[:, 1]
     if gap.min() <= 1e-9 * gap.mean():
         first = int(np.argmin(gap))
         raise InputError(
-            f"nodes {first} and {int(neighbour[first, 1])} coincide at {points[first].tolist()}: interpolation "
-            "needs distinct nodes"
+            f"nodes {first} and {int(neighbour[first, 1])} coincide at {points[first].tolist()}: "
+            "interpolation needs distinct nodes"
         )
     return float(gap.mean())
 

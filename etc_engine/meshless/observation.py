@@ -57,9 +57,11 @@ class Observation:
     def weighted(self, weights: Field) -> Observation:
         """Real part of the weighted columns, each turned by ``weights`` of shape (k, m) into m columns."""
         return Observation(
-            *(np.asarray((table @ weights).real) for table in (self.temperature, self.heat_flux)),
-            *(np.asarray((row @ weights).real) for row in (self.mean_temperature, self.heat_inflow)),
-            np.asarray((self.boundary_values @ weights).real),
+            temperature=np.asarray((self.temperature @ weights).real),
+            heat_flux=np.asarray((self.heat_flux @ weights).real),
+            mean_temperature=np.asarray((self.mean_temperature @ weights).real),
+            heat_inflow=np.asarray((self.heat_inflow @ weights).real),
+            boundary_values=np.asarray((self.boundary_values @ weights).real),
         )
 
 

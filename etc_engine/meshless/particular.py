@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs, lu_factor, lu_solve
+from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
+from scipy.linalg.lapack import dgecon, zgecon
 from scipy.spatial.distance import cdist
 
 from etc_engine.errors import InputError
@@ -73,20 +75,22 @@ def interpolate_source(basis: RadialBasis, nodes: Array, lam: complex = 0.0) -> 
     terms = polynomial.shape[1]
     if terms and (n < terms or np.linalg.matrix_rank(polynomial) < terms):
         raise InputError(
-            f"{n} nodes do not determine the {terms} polynomial terms of degree {basis.polynomial_degree}: add "
-            "nodes off the line or curve they lie on, or lower the degree"
+            f"{n} nodes do not determine the {terms} polynomial terms of degree {basis.polynomial_degree}: "
+            "add nodes off the line or curve they lie on, or lower the degree"
         )
     phi = basis.value(cdist(nodes, nodes), lam)
     matrix = np.zeros((n + terms, n + terms), dtype=phi.dtype)
     matrix[:n, :n] = phi
     matrix[:n, n:], matrix[n:, :n] = polynomial, polynomial.T
     norm = np.abs(matrix).sum(axis=0).max()
-    gecon = get_lapack_funcs("gecon", (matrix,))
-    factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
-    reciprocal, _ = gecon(factors[0], norm)
+    with warnings.catch_warnings():  # an exact zero pivot is answered by the condition number below
+        warnings.simplefilter("ignore", LinAlgWarning)
+        factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
+    estimate = zgecon if np.iscomplexobj(matrix) else dgecon
+    reciprocal, _ = estimate(factors[0], norm)
     if reciprocal == 0.0 or not np.isfinite(reciprocal):
         raise InputError(
-            f"the interpolation matrix of {n} nodes is singular: spread the nodes or lower the order of the spline"
+            f"the interpolation matrix of {n} nodes is singular: spread the nodes or lower the spline's order"
         )
     return SourceInterpolation(basis, nodes, lam, factors, float(1.0 / reciprocal))
 

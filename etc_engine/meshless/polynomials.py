@@ -40,8 +40,8 @@ def particular_monomials(points: Array, lam: complex, degree: int) -> tuple[Fiel
 
     Examples
     --------
-    >>> particular_monomials(np.array([[2.0, 0.0]]), 2.0, 2)[0].round(4)
-    array([[-0.25 , -0.5  , -0.   , -1.125, -0.   , -0.125]])
+    >>> particular_monomials(np.array([[2.0, 0.5]]), 2.0, 2)[0].round(4)
+    array([[-0.25  , -0.5   , -0.125 , -1.125 , -0.25  , -0.1875]])
     """
     build = _rising if abs(lam) < SMALL_LAMBDA else _finite
     solutions = [build({powers: 1.0}, lam) for powers in exponents(degree)]
@@ -63,7 +63,9 @@ def _inverse_laplacian(polynomial: Polynomial) -> Polynomial:
     result: Polynomial = {}
     for (a, b), value in polynomial.items():
         for j in range(b // 2 + 1):
-            factor = (-1.0) ** j * factorial(a) / factorial(a + 2 * j + 2) * factorial(b) / factorial(b - 2 * j)
+            factor = (
+                (-1.0) ** j * factorial(a) / factorial(a + 2 * j + 2) * factorial(b) / factorial(b - 2 * j)
+            )
             powers = (a + 2 * j + 2, b - 2 * j)
             result[powers] = result.get(powers, 0.0) + factor * value
     return result
@@ -89,7 +91,9 @@ def _rising(polynomial: Polynomial, lam: complex) -> Polynomial:
     return result
 
 
-def _evaluate(polynomials: list[Polynomial], points: Array, complex_valued: bool) -> tuple[Field, Field, Field]:
+def _evaluate(
+    polynomials: list[Polynomial], points: Array, complex_valued: bool
+) -> tuple[Field, Field, Field]:
     dtype = complex if complex_valued else float
     highest = max((a + b for polynomial in polynomials for a, b in polynomial), default=0)
     x, y = (np.vander(column, highest + 1, increasing=True) for column in np.asarray(points, dtype=float).T)

@@ -193,7 +193,9 @@ class HeatProblem:
             if not (isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0.0):
                 raise InputError(f"the {name} must be a positive finite number, found {value!r}")
         if (self.vertices is None) == (self.disk is None):
-            raise InputError("a heat problem needs either polygon vertices or a disk: give exactly one of them")
+            raise InputError(
+                "a heat problem needs either polygon vertices or a disk: give exactly one of them"
+            )
         boundary = tuple(self.boundary)
         edges = len(self.domain.edge_lengths)
         if len(boundary) != edges:
@@ -217,7 +219,7 @@ class HeatProblem:
 
     @property
     def diffusivity(self) -> float:
-        """k / (rho c) [m2/s]."""
+        """Thermal diffusivity k / (rho c) [m2/s]."""
         return self.conductivity / self.heat_capacity
 
     def initial_values(self, points: Array) -> Array:
@@ -247,11 +249,13 @@ def sample(data: Data, points: Array, t: float, what: str) -> Array:
         raise InputError(f"{what} must be real numbers, found {values!r}") from error
     if values.shape not in ((), (len(points),)):
         raise InputError(
-            f"{what} answered an array of shape {values.shape} for positions of shape {points.shape}: expected "
-            f"({len(points)},) or one number (x[:, 0] is the first coordinate)"
+            f"{what} answered an array of shape {values.shape} for positions of shape {points.shape}: "
+            f"expected ({len(points)},) or one number (x[:, 0] is the first coordinate)"
         )
     if not np.isfinite(values).all():
-        raise InputError(f"{what} is not finite at t = {t:g}: found {values[~np.isfinite(values)].ravel()[0]}")
+        raise InputError(
+            f"{what} is not finite at t = {t:g}: found {values[~np.isfinite(values)].ravel()[0]}"
+        )
     return np.broadcast_to(values, (len(points),)).copy()
 
 
@@ -266,14 +270,14 @@ def transformed(data: Data, transform: Transform | None, points: Array, s: compl
     if transform is None:
         if callable(data):
             raise InputError(
-                f"{what} is a function without a Laplace transform: give transform=U(x, s) with it, or choose a "
-                "marching scheme (sdirk2, bdf2, crank-nicolson, backward-euler)"
+                f"{what} is a function without a Laplace transform: give transform=U(x, s) with it, or "
+                "choose a marching scheme (sdirk2, bdf2, crank-nicolson, backward-euler)"
             )
         return np.full(len(points), float(data) / s, dtype=complex)
     values = np.asarray(transform(points, s), dtype=complex)
     if values.shape not in ((), (len(points),)) or not np.isfinite(values).all():
         raise InputError(
-            f"the Laplace transform of {what} answered shape {values.shape} (or values that are not finite) for "
-            f"{len(points)} positions at s = {s:g}"
+            f"the Laplace transform of {what} answered shape {values.shape} (or values that are not finite) "
+            f"for {len(points)} positions at s = {s:g}"
         )
     return np.broadcast_to(values, (len(points),)).copy()

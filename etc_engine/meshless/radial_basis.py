@@ -60,7 +60,7 @@ class PolyharmonicSpline:
     --------
     >>> r = np.array([0.0, 0.5])
     >>> PolyharmonicSpline(1).particular(r, 3.0, reach=1.0).round(6)
-    array([-0.048679, -0.04466 ])
+    array([-0.000855, -0.006457])
     """
 
     order: int = 2
@@ -85,7 +85,7 @@ class PolyharmonicSpline:
         return False
 
     def value(self, r: Array, lam: complex = 0.0) -> Field:  # noqa: ARG002
-        """phi = r^{2n} ln r."""
+        """Values phi = r^{2n} ln r."""
         return _logarithmic(r, self.order, 1.0, 0.0)
 
     def slope_over_r(self, r: Array, lam: complex = 0.0) -> Field:  # noqa: ARG002
@@ -93,7 +93,7 @@ class PolyharmonicSpline:
         return _logarithmic_slope(r, self.order, 1.0, 0.0)
 
     def particular(self, r: Array, lam: complex, reach: float) -> Field:
-        """psi at distances r, for |x - x_i| up to ``reach``."""
+        """Values psi at distances r, for |x - x_i| up to ``reach``."""
         return _combine(self, r, lam, reach, slope=False)
 
     def particular_slope_over_r(self, r: Array, lam: complex, reach: float) -> Field:
@@ -128,7 +128,7 @@ class ReverseBasis:
         return True
 
     def value(self, r: Array, lam: complex = 0.0) -> Field:
-        """phi = 1 + r - lambda^2 (r^2/4 + r^3/9)."""
+        """Values phi = 1 + r - lambda^2 (r^2/4 + r^3/9)."""
         return 1.0 + r - lam**2 * self.particular(r, lam, 0.0)
 
     def slope_over_r(self, r: Array, lam: complex = 0.0) -> Field:
@@ -137,7 +137,7 @@ class ReverseBasis:
         return cusp - lam**2 * self.particular_slope_over_r(r, lam, 0.0)
 
     def particular(self, r: Array, lam: complex, reach: float) -> Field:  # noqa: ARG002
-        """psi = r^2/4 + r^3/9."""
+        """Values psi = r^2/4 + r^3/9."""
         return r * r * (0.25 + r / 9.0)
 
     def particular_slope_over_r(self, r: Array, lam: complex, reach: float) -> Field:  # noqa: ARG002
@@ -173,7 +173,7 @@ def _iterated_laplacians(order: int) -> list[tuple[float, float]]:
 
 
 def _combine(spline: PolyharmonicSpline, r: Array, lam: complex, reach: float, slope: bool) -> Field:
-    """psi (or psi'/r): the power series where lambda r is small, the closed form elsewhere."""
+    """Values psi, or psi'/r: the power series where lambda r is small, the closed form elsewhere."""
     series = _series_slope if slope else _series
     n = spline.order
     if abs(lam) * reach <= SMALL_REACH:

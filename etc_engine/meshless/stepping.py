@@ -37,7 +37,7 @@ class StepOperator:
 
     @property
     def lam(self) -> float:
-        """lambda in scaled coordinates."""
+        """The real lambda, in scaled coordinates."""
         return float(np.real(self.operator.lam))
 
     def nodal(self, source: Array, data: Array) -> Array:
@@ -104,7 +104,7 @@ def step_counts(times: Array, steps: int) -> NDArray[np.int64]:
     (array([25, 25]), array([ 1, 50]))
     """
     lengths = np.diff(times, prepend=0.0)
-    return np.maximum(1, np.ceil(steps * lengths / times[-1] - 1e-9)).astype(np.int64)
+    return np.asarray(np.maximum(1, np.ceil(steps * lengths / times[-1] - 1e-9)), dtype=np.int64)
 
 
 def march(library: StepLibrary, scheme: str, times: Array, steps: int) -> Iterator[Snapshot]:
@@ -181,9 +181,13 @@ def _crank_nicolson(
         layout.problem.source_values(layout.nodes, t) + layout.problem.source_values(layout.nodes, t + tau)
     )
     source = -(step.lam**2) * values - layout.scale**2 * heating / layout.problem.conductivity
-    data = 0.5 * (layout.boundary_data(layout.collocation, t) + layout.boundary_data(layout.collocation, t + tau))
+    data = 0.5 * (
+        layout.boundary_data(layout.collocation, t) + layout.boundary_data(layout.collocation, t + tau)
+    )
     middle = step.nodal(source, data)
-    return Snapshot(t + tau, 2.0 * middle - values, step, 2.0 * source - state.source, 2.0 * data - state.data)
+    return Snapshot(
+        t + tau, 2.0 * middle - values, step, 2.0 * source - state.source, 2.0 * data - state.data
+    )
 
 
 def spectral_radius(step: StepOperator, scheme: str) -> float:
@@ -195,15 +199,15 @@ def spectral_radius(step: StepOperator, scheme: str) -> float:
     """
     n = len(step.response)
     if n <= DENSE_LIMIT:
-        s = eigvals(-(step.lam**2) * step.response, check_finite=False)
+        s = np.asarray(eigvals(-(step.lam**2) * step.response, check_finite=False), dtype=complex)
         return float(np.abs(amplification(s, scheme)).max())
     size = 2 * n if scheme == "bdf2" else n
     once = LinearOperator((size, size), matvec=lambda u: _free_step(step, scheme, u.ravel()), dtype=float)
     try:  # a fixed starting vector keeps the figure reproducible
-        largest = eigs(once, k=2, v0=np.cos(np.arange(size)), tol=1e-6, return_eigenvectors=False)
+        largest: NDArray = eigs(once, k=2, v0=np.cos(np.arange(size)), tol=1e-6, return_eigenvectors=False)
     except ArpackNoConvergence as stopped:
-        largest = stopped.eigenvalues if len(stopped.eigenvalues) else np.array([np.nan])
-    return float(np.abs(largest).max())
+        largest = stopped.eigenvalues
+    return float(np.abs(largest).max()) if len(largest) else float("nan")
 
 
 def _free_step(step: StepOperator, scheme: str, values: Array) -> Array:

@@ -43,7 +43,7 @@ def trefftz_functions(points: Array, lam: complex, count: int) -> tuple[Field, F
     --------
     >>> value, along_x, _ = trefftz_functions(np.array([[1.0, 0.0]]), 2.0, 3)
     >>> value.round(12), along_x.round(6)
-    (array([[1., 1., 0.]]), array([[1.395548, 1.866164, 0.      ]]))
+    (array([[1., 1., 0.]]), array([[1.395549, 1.866255, 0.      ]]))
     """
     highest = count // 2
     r, phi = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
@@ -52,7 +52,8 @@ def trefftz_functions(points: Array, lam: complex, count: int) -> tuple[Field, F
     n = np.arange(highest + 2)
     cosine, sine = np.cos(np.outer(phi, n)), np.sin(np.outer(phi, n))
     c, s = radial * cosine, radial * sine
-    # with E_n = I_n e^{i n phi}: 2 dE_n/dx = lambda (E_{n-1} + E_{n+1}), 2 i dE_n/dy = lambda (E_{n+1} - E_{n-1})
+    # with E_n = I_n e^{i n phi}, 2 dE_n/dx = lambda (E_{n-1} + E_{n+1}) and
+    # 2 i dE_n/dy = lambda (E_{n+1} - E_{n-1})
     up = 0.5 * lam * step[: highest + 1]
     down = np.concatenate([up[:1], 0.5 * lam / step[:highest]])
     below_c = np.column_stack([c[:, 1], c[:, :highest]])  # I_{-1} e^{-i phi}
