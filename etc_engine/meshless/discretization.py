@@ -63,7 +63,7 @@ class Discretization:
     spacing: Spacing = "chebyshev"
     basis: RadialBasis = PolyharmonicSpline(2)  # noqa: RUF009 - frozen, so one instance may be shared
     functions: int | None = None
-    source_offset: float = 0.4
+    source_offset: float = 0.6
     source_factor: float | None = None
     source_center: tuple[float, float] | None = None
     length_scale: float | None = None
@@ -195,14 +195,16 @@ def _place_sources(
 ) -> Array:
     domain, boundary = problem.domain, discretization.boundary
     if isinstance(boundary, int | np.integer):
-        base = node_layouts.boundary_nodes(
-            domain, max(functions, 3 * len(problem.boundary)), discretization.spacing
-        )
+        least = 3 * len(problem.boundary)
+        base = node_layouts.boundary_nodes(domain, max(functions, least), discretization.spacing)
+        points, normals = base.points, base.normals
     else:
         base = _collocation_nodes(problem, discretization)
+        chosen = np.linspace(0.0, base.count, functions, endpoint=False).astype(int)
+        points, normals = base.points[chosen], base.normals[chosen]
     if discretization.source_factor is not None:
         center = discretization.source_center
         return factor_sources(
-            domain, base.points, discretization.source_factor, None if center is None else np.array(center)
+            domain, points, discretization.source_factor, None if center is None else np.array(center)
         )
-    return offset_sources(domain, base.points, base.normals, discretization.source_offset * radius)
+    return offset_sources(domain, points, normals, discretization.source_offset * radius)

@@ -141,7 +141,9 @@ def solve_transient(
         "units": "1",
         "long_name": "largest violation of the boundary conditions over the temperature span",
     }
-    return result.assign(boundary_residual=("time", residuals, about)).assign_attrs(diagnostics.attributes())
+    return result.assign(boundary_residual=("time", residuals, about)).assign_attrs(
+        boundary_residual_max=float(np.nanmax(residuals, initial=0.0)), **diagnostics.attributes()
+    )
 
 
 def _solve_marching(
