@@ -318,12 +318,22 @@ class Disk:
         return points, np.repeat(0.5 * weights * self.area / len(angle), len(angle))
 
 
-def boundary_quadrature(domain: Domain, order: int) -> tuple[Array, Array, Array]:
-    """Gauss points (k, 2), outward normals (k, 2) and weights (k,) [m] on every boundary piece."""
+def boundary_quadrature(domain: Domain, order: int, panels: int = 16) -> tuple[Array, Array, Array]:
+    """Gauss points (k, 2), outward normals (k, 2) and weights (k,) [m] along the boundary.
+
+    The boundary is cut into at least ``panels`` pieces of about equal length, shared over the edges.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(order)
-    pieces = [domain.edge_points(edge, 0.5 * (nodes + 1.0)) for edge in range(len(domain.edge_lengths))]
-    points, normals = (np.vstack([piece[i] for piece in pieces]) for i in range(2))
-    return points, normals, np.concatenate([0.5 * weights * length for length in domain.edge_lengths])
+    lengths = domain.edge_lengths
+    points, normals, measures = [], [], []
+    for edge, length in enumerate(lengths):
+        count = int(np.ceil(panels * length / lengths.sum() - 1e-9))
+        s = (np.arange(count)[:, None] + 0.5 * (nodes + 1.0)).ravel() / count
+        at, outward = domain.edge_points(edge, s)
+        points.append(at)
+        normals.append(outward)
+        measures.append(np.tile(0.5 * weights * length / count, count))
+    return np.vstack(points), np.vstack(normals), np.concatenate(measures)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -144,13 +144,14 @@ def _spread(candidates: Array, local: Array, depth: Array, count: int) -> Array:
         raise GeometryError(f"{count} interior nodes do not fit into the body: ask for fewer")
     chosen = np.empty(count, dtype=np.int64)
     chosen[0] = int(np.argmax(depth))
-    x, y = np.ascontiguousarray(candidates.T)
+    x, y = np.ascontiguousarray(candidates.T / np.ptp(candidates, axis=0).max())
     weight = 1.0 / local**2
     gap = np.full(len(candidates), np.inf)
     for k in range(1, count):
         last = chosen[k - 1]
         np.minimum(gap, ((x - x[last]) ** 2 + (y - y[last]) ** 2) * weight, out=gap)
-        chosen[k] = int(np.argmax(gap))
+        # ties (symmetric bodies) go by the order of the candidates, whatever the unit of length
+        chosen[k] = int(np.argmax(np.round(gap, 10)))
     return np.asarray(candidates[chosen])
 
 

@@ -16,7 +16,7 @@ Field = NDArray
 
 CHUNK = 2000
 AREA_ORDER = 8
-EDGE_ORDER = 20
+EDGE_ORDER = 10
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,19 +148,33 @@ def march(library: StepLibrary, scheme: str, times: Array, steps: int) -> Iterat
         yield Snapshot(float(end), state.values, state.step, state.source, state.data)
 
 
-def _implicit(step: StepOperator, layout: Layout, base: Array, t: float) -> Snapshot:
-    """Solve (lap - lambda^2) u = -lambda^2 base - Q(t)/k with the boundary data of time t."""
+def _implicit(
+    step: StepOperator, layout: Layout, base: Array, t: float, data: Array | None = None
+) -> Snapshot:
+    """Solve (lap - lambda^2) u = -lambda^2 base - Q(t)/k with the boundary data of time t, or those given."""
     heating = layout.problem.source_values(layout.nodes, t) / layout.problem.conductivity
     source = -(step.lam**2) * base - layout.scale**2 * heating
-    data = layout.boundary_data(layout.collocation, t)
+    if data is None:
+        data = layout.boundary_data(layout.collocation, t)
     return Snapshot(t, step.nodal(source, data), step, source, data)
 
 
 def _sdirk2(library: StepLibrary, values: Array, t: float, tau: float) -> Snapshot:
-    step = library.get(1.0 / GAMMA, tau)
-    stage = _implicit(step, library.layout, values, t + GAMMA * tau).values
+    step, layout = library.get(1.0 / GAMMA, tau), library.layout
+    stage = _implicit(step, layout, values, t + GAMMA * tau, _stage_data(layout, t, tau)).values
     base = values + (1.0 - GAMMA) / GAMMA * (stage - values)
-    return _implicit(step, library.layout, base, t + tau)
+    return _implicit(step, layout, base, t + tau)
+
+
+def _stage_data(layout: Layout, t: float, tau: float) -> Array:
+    """Boundary data of the first SDIRK stage by the method itself: g(t) + gamma tau g'(t + gamma tau).
+
+    The slope is that of the parabola through g at t, t + gamma tau and t + tau. Data of the stage's own
+    time would not fit the first-order stage inside and cost a factor of three in accuracy.
+    """
+    start, stage, end = (layout.boundary_data(layout.collocation, t + c * tau) for c in (0.0, GAMMA, 1.0))
+    slope = (GAMMA - 1.0) / GAMMA * start + (2.0 * GAMMA - 1.0) / (GAMMA * (GAMMA - 1.0)) * stage
+    return np.asarray(start + GAMMA * (slope + GAMMA / (1.0 - GAMMA) * end))
 
 
 def _bdf2(library: StepLibrary, values: Array, previous: Array | None, t: float, tau: float) -> Snapshot:
