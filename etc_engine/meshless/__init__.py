@@ -1,0 +1,25 @@
+"""Meshless transient heat conduction: dual reciprocity with Trefftz functions or fundamental solutions."""
+
+from etc_engine.meshless.contact_heating import ContactArc, heat_disk_through_arcs
+from etc_engine.meshless.diagnostics import DiscretizationWarning
+from etc_engine.meshless.discretization import Discretization
+from etc_engine.meshless.domain import Disk, Polygon
+from etc_engine.meshless.problem import Convective, Dirichlet, HeatProblem, Neumann
+from etc_engine.meshless.radial_basis import PolyharmonicSpline, ReverseBasis
+from etc_engine.meshless.solve import solve_transient
+
+__all__ = [
+    "ContactArc",
+    "Convective",
+    "Dirichlet",
+    "Discretization",
+    "DiscretizationWarning",
+    "Disk",
+    "HeatProblem",
+    "Neumann",
+    "Polygon",
+    "PolyharmonicSpline",
+    "ReverseBasis",
+    "heat_disk_through_arcs",
+    "solve_transient",
+]

@@ -1,0 +1,285 @@
+"""Transient study files of kind "meshless": the schema, and the run from parsed TOML to a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from etc_engine.errors import InputError, StudyError
+from etc_engine.meshless.contact_heating import ContactArc, heat_disk_through_arcs
+from etc_engine.meshless.discretization import Discretization
+from etc_engine.meshless.domain import Disk
+from etc_engine.meshless.problem import BoundaryCondition, Convective, Data, Dirichlet, HeatProblem, Neumann
+from etc_engine.meshless.radial_basis import PolyharmonicSpline
+from etc_engine.meshless.solve import solve_transient
+
+if TYPE_CHECKING:
+    import xarray
+
+Positive = Annotated[float, Field(gt=0.0)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class TimeTable(_Strict):
+    """Values at increasing times, linear in between and constant outside."""
+
+    times: list[Finite] = Field(min_length=2)
+    values: list[Finite] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _check(self) -> TimeTable:
+        if len(self.times) != len(self.values) or any(np.diff(self.times) <= 0.0):
+            raise ValueError("a table needs increasing times and as many values")
+        return self
+
+    def at(self, t: float) -> float:
+        """The value at a time."""
+        return float(np.interp(t, self.times, self.values))
+
+
+Value = Finite | TimeTable
+
+
+class DiskShape(_Strict):
+    """A disk; ``breaks`` [degree] cut its circle into edges."""
+
+    center: tuple[Finite, Finite] = (0.0, 0.0)
+    radius: Positive
+    breaks: list[Finite] = []
+
+
+class Body(_Strict):
+    """Shape, material, uniform source and uniform initial temperature (SI units)."""
+
+    vertices: list[tuple[Finite, Finite]] | None = None
+    disk: DiskShape | None = None
+    conductivity: Positive
+    heat_capacity: Positive
+    initial: Finite
+    source: Value = 0.0
+
+
+class Edge(_Strict):
+    """Boundary condition of one edge."""
+
+    type: Literal["dirichlet", "neumann", "convective"]
+    value: Value = Field(
+        description="temperature [K], heat flux into the body [W/m2] or ambient temperature [K]"
+    )
+    coefficient: Positive | None = Field(default=None, description="heat transfer coefficient [W/(m2 K)]")
+
+    @model_validator(mode="after")
+    def _check(self) -> Edge:
+        if (self.type == "convective") != (self.coefficient is not None):
+            raise ValueError("a coefficient goes with type = 'convective', and only with it")
+        return self
+
+
+class Contact(_Strict):
+    """A contact arc of a disk: angles in degrees, heat per unit thickness [W/m]."""
+
+    angle: Finite
+    half_angle: Annotated[float, Field(gt=0.0, lt=90.0)]
+    heat: Value
+
+
+class Output(_Strict):
+    """Output times [s], and points [m] or a square grid of about ``grid`` points a side."""
+
+    times: list[Finite] = Field(min_length=1)
+    points: list[tuple[Finite, Finite]] = []
+    grid: int | None = Field(default=None, ge=2, le=400)
+
+
+class Solver(_Strict):
+    """Method, scheme and discretization; what is left out takes the defaults of the solver."""
+
+    method: Literal["trefftz", "mfs"] = "trefftz"
+    scheme: Literal["sdirk2", "bdf2", "crank-nicolson", "backward-euler", "laplace"] = "sdirk2"
+    steps: int = Field(default=100, ge=1)
+    boundary_nodes: int | None = Field(default=None, ge=3)
+    interior_nodes: int | None = Field(default=None, ge=1)
+    spacing: Literal["chebyshev", "uniform"] = "chebyshev"
+    spline_order: int = Field(default=2, ge=1, le=5)
+    functions: int | None = Field(default=None, ge=1)
+    source_offset: Positive | None = None
+
+
+class MeshlessStudy(_Strict):
+    """A transient study of kind "meshless"."""
+
+    schema_version: Literal[1] = Field(alias="schema")
+    kind: Literal["meshless"]
+    name: str
+    body: Body
+    boundary: list[Edge] = []
+    contact: list[Contact] = []
+    output: Output
+    solver: Solver = Solver()
+
+    @model_validator(mode="after")
+    def _check(self) -> MeshlessStudy:
+        if (self.body.vertices is None) == (self.body.disk is None):
+            raise ValueError("[body] needs either vertices or a disk")
+        if not self.output.points and self.output.grid is None:
+            raise ValueError("[output] needs points or a grid")
+        if self.contact and (self.body.disk is None or self.boundary):
+            raise ValueError("[[contact]] goes with a disk, and instead of [[boundary]]")
+        if (
+            self.contact
+            and self.body.disk is not None
+            and (self.body.disk.breaks or any(self.body.disk.center))
+        ):
+            raise ValueError("a disk with [[contact]] sits at the origin and has no breaks")
+        if self.contact and (self.solver.method != "trefftz" or self.body.source != 0.0):
+            raise ValueError("a disk with [[contact]] is solved by Trefftz functions and has no source")
+        return self
+
+
+def parse_study(content: Mapping[str, Any]) -> MeshlessStudy:
+    """The study of a parsed TOML file.
+
+    Raises
+    ------
+    StudyError
+        If it does not follow the schema; the message names the first offending entry.
+    """
+    try:
+        return MeshlessStudy.model_validate(dict(content))
+    except ValidationError as error:
+        first, count = error.errors()[0], error.error_count()
+        place = ".".join(str(part) for part in first["loc"]) or "the study"
+        more = f" (and {count - 1} more)" if count > 1 else ""
+        raise StudyError(f"{place}: {first['msg'].removeprefix('Value error, ')}{more}") from error
+
+
+def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
+    """Solve a study of kind "meshless".
+
+    Parameters
+    ----------
+    content : mapping
+        The parsed TOML file.
+
+    Returns
+    -------
+    xarray.Dataset
+        That of ``solve_transient`` (or ``heat_disk_through_arcs``), with the name of the study.
+
+    Examples
+    --------
+    >>> result = run_study({
+    ...     "schema": 1, "kind": "meshless", "name": "quench",
+    ...     "body": {"disk": {"radius": 1.0}, "conductivity": 1.0, "heat_capacity": 1.0, "initial": 1.0},
+    ...     "boundary": [{"type": "dirichlet", "value": 0.0}],
+    ...     "output": {"times": [0.1], "points": [[0.0, 0.0]]}, "solver": {"scheme": "laplace"}})
+    >>> round(float(result.temperature[0, 0]), 5)
+    0.84836
+    """
+    study = parse_study(content)
+    if study.contact:
+        return _run_contacts(study).assign_attrs(study=study.name)
+    problem = HeatProblem(
+        vertices=None if study.body.vertices is None else np.array(study.body.vertices),
+        disk=_disk(study.body.disk),
+        conductivity=study.body.conductivity,
+        heat_capacity=study.body.heat_capacity,
+        initial=study.body.initial,
+        source=_data(study.body.source),
+        boundary=[_condition(edge) for edge in study.boundary],
+    )
+    solver = study.solver
+    result = solve_transient(
+        problem,
+        study.output.times,
+        _points(study, problem),
+        method=solver.method,
+        scheme=solver.scheme,
+        steps=solver.steps,
+        discretization=_discretization(solver),
+    )
+    return result.assign_attrs(study=study.name)
+
+
+def _run_contacts(study: MeshlessStudy) -> xarray.Dataset:
+    assert study.body.disk is not None
+    nodes = (study.solver.boundary_nodes, study.solver.interior_nodes)
+    if any(count is not None for count in nodes) and None in nodes:
+        raise StudyError("solver: with [[contact]] give both boundary_nodes and interior_nodes, or neither")
+    disk = HeatProblem(
+        disk=_disk(study.body.disk), conductivity=1.0, heat_capacity=1.0, initial=0.0, boundary=[Neumann(0.0)]
+    )
+    return heat_disk_through_arcs(
+        [ContactArc(np.radians(contact.angle), np.radians(contact.half_angle)) for contact in study.contact],
+        [
+            contact.heat.at if isinstance(contact.heat, TimeTable) else contact.heat
+            for contact in study.contact
+        ],
+        study.output.times,
+        radius=study.body.disk.radius,
+        conductivity=study.body.conductivity,
+        heat_capacity=study.body.heat_capacity,
+        initial=study.body.initial,
+        points=_points(study, disk),
+        scheme=study.solver.scheme,
+        steps=study.solver.steps,
+        discretization=None if None in nodes else _discretization(study.solver),
+    )
+
+
+def _discretization(solver: Solver) -> Discretization:
+    given = {
+        "boundary": solver.boundary_nodes,
+        "interior": solver.interior_nodes,
+        "functions": solver.functions,
+        "source_offset": solver.source_offset,
+    }
+    return Discretization(
+        spacing=solver.spacing,
+        basis=PolyharmonicSpline(solver.spline_order),
+        **{name: value for name, value in given.items() if value is not None},  # type: ignore[arg-type]
+    )
+
+
+def _disk(shape: DiskShape | None) -> Disk | None:
+    if shape is None:
+        return None
+    return Disk(shape.center, shape.radius, tuple(np.radians(shape.breaks).tolist()))
+
+
+def _data(value: float | TimeTable) -> Data:
+    if not isinstance(value, TimeTable):
+        return value
+    table = value
+    history: Callable[[np.ndarray, float], float] = lambda _, t: table.at(t)  # noqa: E731
+    return history
+
+
+def _condition(edge: Edge) -> BoundaryCondition:
+    if edge.type == "dirichlet":
+        return Dirichlet(_data(edge.value))
+    if edge.type == "neumann":
+        return Neumann(_data(edge.value))
+    assert edge.coefficient is not None
+    return Convective(edge.coefficient, _data(edge.value))
+
+
+def _points(study: MeshlessStudy, problem: HeatProblem) -> np.ndarray:
+    points = np.array(study.output.points, dtype=float).reshape(-1, 2)
+    if study.output.grid is None:
+        return points
+    low, high = problem.domain.bounds
+    step = (high - low).max() / study.output.grid
+    axes = [np.arange(a + 0.5 * step, b, step) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = grid[problem.domain.contains(grid)]
+    if len(points) + len(inside) == 0:
+        raise InputError("no point of the output grid lies inside the body: use a finer grid")
+    return np.vstack([points, inside])

@@ -1,0 +1,138 @@
+"""The command etc-engine transient: a study file in, a netCDF file out, one-line refusals."""
+
+import pytest
+import xarray
+from click.testing import CliRunner
+
+from etc_engine.cli.transient import transient_command
+from etc_engine.errors import EtcError, OutputError, StudyError
+from etc_engine.meshless import Dirichlet, HeatProblem, solve_transient
+
+STUDY = """
+schema = 1
+kind = "meshless"
+name = "cooled square"
+
+[body]
+vertices = [[0, 0], [3, 0], [3, 3], [0, 3]]
+conductivity = 1.25
+heat_capacity = 1.0
+initial = 30.0
+
+[[boundary]]
+type = "dirichlet"
+value = 0.0
+[[boundary]]
+type = "dirichlet"
+value = 0.0
+[[boundary]]
+type = "dirichlet"
+value = 0.0
+[[boundary]]
+type = "dirichlet"
+value = 0.0
+
+[output]
+times = [0.6, 1.2]
+points = [[1.5, 1.5], [2.4, 2.4]]
+
+[solver]
+steps = 24
+boundary_nodes = 60
+interior_nodes = 120
+"""
+CONTACTS = """
+schema = 1
+kind = "meshless"
+name = "ramp through a contact"
+[body]
+disk = {radius = 1.0}
+conductivity = 1.0
+heat_capacity = 1.0
+initial = 0.0
+[[contact]]
+angle = 90
+half_angle = 30
+heat = {times = [0.0, 1.0], values = [0.0, 1.0]}
+[output]
+times = [1.0]
+grid = 6
+[solver]
+steps = 50
+"""
+
+
+def run(tmp_path, text, *options):
+    study, output = tmp_path / "study.toml", tmp_path / "out.nc"
+    study.write_text(text)
+    command = [str(study), "-o", str(output), *options]
+    return CliRunner().invoke(transient_command, command, standalone_mode=False), output
+
+
+def test_a_polygon_study_is_solved(tmp_path):
+    result, output = run(tmp_path, STUDY)
+    assert result.exception is None
+    problem = HeatProblem(
+        vertices=[(0, 0), (3, 0), (3, 3), (0, 3)],
+        conductivity=1.25,
+        heat_capacity=1.0,
+        initial=30.0,
+        boundary=[Dirichlet(0.0)] * 4,
+    )
+    points = [(1.5, 1.5), (2.4, 2.4)]
+    with xarray.open_dataset(output) as found:
+        assert found.temperature.dims == ("time", "point")
+        assert found.attrs["study_file"] == STUDY
+        reference = solve_transient(problem, [0.6, 1.2], points, scheme="laplace").temperature.values
+        assert abs(found.temperature.values / reference - 1.0).max() < 0.02
+    assert [path.name for path in tmp_path.iterdir() if path.suffix == ".tmp"] == []
+
+
+def test_a_contact_study_follows_its_table(tmp_path):
+    result, output = run(tmp_path, CONTACTS)
+    assert result.exception is None
+    with xarray.open_dataset(output) as found:
+        # heat t over [0, 1]: mean rise 1/(2 pi)
+        assert float(found.mean_temperature[0]) == pytest.approx(0.5 / 3.141592653589793, rel=5e-3)
+        assert found.arc_temperature.shape == (1, 1)
+
+
+def test_an_existing_output_is_kept_without_overwrite(tmp_path):
+    (tmp_path / "out.nc").write_text("precious")
+    result, output = run(tmp_path, STUDY)
+    assert isinstance(result.exception, OutputError) and output.read_text() == "precious"
+    result, output = run(tmp_path, STUDY, "--overwrite")
+    assert result.exception is None and output.read_bytes() != b"precious"
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        ("schema = 1", "schema = 2", "schema = 1 is expected"),
+        ('kind = "meshless"', 'kind = "magic"', "expected one of meshless"),
+        ("steps = 24", "steps = 0", "solver.steps"),
+        ("steps = 24", "stepps = 24", "solver.stepps"),
+        ("conductivity = 1.25", "conductivity = -1.0", "body.conductivity"),
+        ("initial = 30.0", "initial = [", "not a TOML file"),
+        ('type = "dirichlet"\nvalue = 0.0', 'type = "convective"\nvalue = 0.0', "coefficient"),
+        ("points = [[1.5, 1.5], [2.4, 2.4]]", "points = []", "points or a grid"),
+        ("points = [[1.5, 1.5], [2.4, 2.4]]", "points = [[5, 5]]", "outside the body"),
+        ("[3, 3], [0, 3]]", "[0, 3], [3, 3]]", "cross"),
+    ],
+)
+def test_refused_studies(tmp_path, old, new, message):
+    assert old in STUDY
+    result, output = run(tmp_path, STUDY.replace(old, new, 1))
+    assert isinstance(result.exception, EtcError)
+    assert message in str(result.exception) and "\n" not in str(result.exception)
+    assert not output.exists()
+
+
+def test_a_missing_study_and_a_missing_folder(tmp_path):
+    command = [str(tmp_path / "none.toml"), "-o", str(tmp_path / "out.nc")]
+    result = CliRunner().invoke(transient_command, command, standalone_mode=False)
+    assert isinstance(result.exception, StudyError)
+    (tmp_path / "study.toml").write_text(STUDY)
+    command = [str(tmp_path / "study.toml"), "-o", str(tmp_path / "none" / "out.nc")]
+    result = CliRunner().invoke(transient_command, command, standalone_mode=False)
+    assert isinstance(result.exception, OutputError)
