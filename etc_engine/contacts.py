@@ -37,6 +37,8 @@ class ContactNetwork:
         Particle and wall of each wall contact; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end.
     wall_angles : ndarray, shape (w,) [rad]
         Half-angle of the wall contact's arc.
+    geometric : bool
+        Whether the arcs are those that particles and walls cut out of each other, not prescribed ones.
 
     Notes
     -----
@@ -50,6 +52,7 @@ class ContactNetwork:
     wall_particles: NDArray[np.int64]
     walls: NDArray[np.int64]
     wall_angles: NDArray[np.float64]
+    geometric: bool = False
 
     @property
     def count(self) -> int:
@@ -79,6 +82,7 @@ class ContactNetwork:
             self,
             angles=np.full_like(self.angles, half_angle),
             wall_angles=np.full_like(self.wall_angles, half_angle),
+            geometric=False,
         )
 
     def select(self, contacts: NDArray[np.bool_], wall_contacts: NDArray[np.bool_]) -> ContactNetwork:
@@ -152,7 +156,7 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
     wall_particles, walls, wall_distances = _wall_distances(packing, ROUND_OFF_OVERLAP, -1.0)
     wall_radii = radii[wall_particles]
     wall_angles = 2.0 * np.arcsin(np.sqrt(np.clip((wall_radii - wall_distances) / (2.0 * wall_radii), 0.0, 1.0)))
-    return ContactNetwork(packing, pairs, shifts, angles, wall_particles, walls, wall_angles)
+    return ContactNetwork(packing, pairs, shifts, angles, wall_particles, walls, wall_angles, geometric=True)
 
 
 def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float = 1e-6) -> ContactNetwork:

@@ -90,6 +90,7 @@ def effective_conductivity(
     conductivity: ArrayLike = 1.0,
     contact_resistance: ArrayLike = 0.0,
     tolerance: float = 1e-10,
+    modes: int | None = None,
     axes: tuple[int, ...] | None = None,
     backbones: Mapping[tuple[int, ...], Backbone] | None = None,
 ) -> EffectiveConductivity:
@@ -100,7 +101,7 @@ def effective_conductivity(
     Parameters
     ----------
     network : ContactNetwork
-    method, conductivity, contact_resistance, tolerance
+    method, conductivity, contact_resistance, tolerance, modes
         As in `etc_engine.dtem.steady.solve_steady`.
     axes : tuple of int, optional
         Load axes wanted; all by default.
@@ -138,6 +139,7 @@ def effective_conductivity(
             conductivity=conductivity,
             contact_resistance=contact_resistance,
             tolerance=tolerance,
+            modes=modes,
             backbone=backbones[group],
         )
         for axis, flag in zip(group, solution.backbone.spans, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -83,6 +83,29 @@ def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
     contacts = kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
     wall_contacts = driven & kept[network.wall_particles]
     return Backbone(contacts, wall_contacts, clusters, spans)
+
+
+def restore_dead_ends(network: ContactNetwork, backbone: Backbone) -> Backbone:
+    """The same backbone with the dead ends of its clusters.
+
+    They pass on no heat, but a contact resolved over its width sees some of it turn back in them.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+    backbone : Backbone
+        Of this network.
+    """
+    ends, walls = network.pairs[:, 0], network.wall_particles
+    in_play = np.zeros(network.packing.count, dtype=np.bool_)
+    in_play[backbone.clusters[ends[backbone.contacts]]] = True
+    in_play[backbone.clusters[walls[backbone.wall_contacts]]] = True
+    driven_walls = np.isin(network.walls, network.walls[backbone.wall_contacts])
+    return replace(
+        backbone,
+        contacts=in_play[backbone.clusters[ends]],
+        wall_contacts=driven_walls & in_play[backbone.clusters[walls]],
+    )
 
 
 @njit(cache=True)

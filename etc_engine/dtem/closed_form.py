@@ -11,7 +11,7 @@ from etc_engine.dtem.resistance import mutual_resistance_scalar, self_resistance
 from etc_engine.dtem.sides import ContactSides
 
 
-def closed_form_elements(sides: ContactSides, material: Material, method: str) -> Elements:
+def closed_form_elements(sides: ContactSides, material: Material, modes: int = 1, *, method: str) -> Elements:
     """Conductivity matrices of all disks, H in closed form.
 
     H = (kappa h_ij)/kappa, plus each side's share of the contact resistance on the diagonal.
@@ -20,6 +20,8 @@ def closed_form_elements(sides: ContactSides, material: Material, method: str) -
     ----------
     sides : ContactSides
     material : Material
+    modes : int
+        Always 1.
     method : str
         ``standard``, ``enhanced`` or ``chord``: what h_ii is.
 
@@ -49,7 +51,7 @@ def closed_form_elements(sides: ContactSides, material: Material, method: str) -
         int(np.diff(sides.offsets).max(initial=1)),
     )
     refuse_indefinite(bad, sides)
-    return Elements(1, sides.offsets, sides.nodes, starts, values)
+    return Elements(modes, sides.offsets, sides.nodes, starts, values)
 
 
 def closed_form_potentials(

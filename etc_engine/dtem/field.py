@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.dtem.methods import find_method
-from etc_engine.dtem.sides import ContactSides, contact_sides
-from etc_engine.dtem.steady import SteadySolution
+from etc_engine.dtem.sides import NO_CUTS, ContactSides, contact_sides, insulated_cuts
+from etc_engine.dtem.steady import SteadySolution, driven_walls
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +72,15 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
     network, backbone, axis = solution.network, solution.backbone, solution.axes[load]
     packing = network.packing
     periodic = packing.box.periodic[axis]
-    sides = contact_sides(network)
+    variant = find_method(solution.method)
+    cuts = insulated_cuts(network, driven_walls(network, solution.axes)) if variant.exact_cuts else NO_CUTS
+    sides = contact_sides(network, cuts)
     rows = np.empty(solution.sides.nodes.size, dtype=np.int64)
     rows[solution.sides.of_contacts] = sides.of_contacts[backbone.contacts]
     rows[solution.sides.of_walls] = sides.of_walls[backbone.wall_contacts]
     flows = np.zeros((sides.nodes.size, solution.flows.shape[1]))
     flows[rows] = solution.flows[:, :, load]
-    potentials = find_method(solution.method).potentials(sides, solution.material, flows)
+    potentials = variant.potentials(sides, solution.material, flows)
 
     owner = sides.particles[rows]
     number = np.bincount(owner, minlength=packing.count)

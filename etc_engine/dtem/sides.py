@@ -13,6 +13,28 @@ from etc_engine.errors import GeometryError
 
 
 @dataclass(frozen=True, eq=False)
+class InsulatedCuts:
+    """Chords at which insulated walls cut disks.
+
+    Parameters
+    ----------
+    particles : ndarray of int, shape (c,)
+    walls : ndarray of int, shape (c,)
+        Row of the cut among the wall contacts of the network.
+    theta, alpha : ndarray, shape (c,) [rad]
+        Position angle and half-angle of each cut.
+    """
+
+    particles: NDArray[np.int64]
+    walls: NDArray[np.int64]
+    theta: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+
+
+NO_CUTS = InsulatedCuts(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
+
+
+@dataclass(frozen=True, eq=False)
 class ContactSides:
     """The contacts as each particle sees them, sorted by particle.
 
@@ -33,6 +55,8 @@ class ContactSides:
         The two sides of each particle contact.
     of_walls : ndarray of int, shape (w,)
         The side of each wall contact.
+    cuts : InsulatedCuts
+        What insulated walls cut off; only ``exact`` heeds it.
     """
 
     offsets: NDArray[np.int64]
@@ -42,6 +66,7 @@ class ContactSides:
     alpha: NDArray[np.float64]
     of_contacts: NDArray[np.int64]
     of_walls: NDArray[np.int64]
+    cuts: InsulatedCuts = NO_CUTS
 
     @property
     def particles(self) -> NDArray[np.int64]:
@@ -56,7 +81,23 @@ class ContactSides:
         return signs
 
 
-def contact_sides(network: ContactNetwork) -> ContactSides:
+def insulated_cuts(network: ContactNetwork, driven: NDArray[np.bool_]) -> InsulatedCuts:
+    """The cuts at the wall contacts that are not driven; none where arcs are prescribed.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+        Two-dimensional.
+    driven : ndarray of bool, shape (w,)
+    """
+    if not network.geometric:
+        return NO_CUTS
+    rows = np.flatnonzero(~driven)
+    towards = np.array([np.pi, 0.0, -0.5 * np.pi, 0.5 * np.pi])
+    return InsulatedCuts(network.wall_particles[rows], rows, towards[network.walls[rows]], network.wall_angles[rows])
+
+
+def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> ContactSides:
     """The two sides of every particle contact and the one side of every wall contact, by particle."""
     packing, m = network.packing, network.count
     radii = packing.radii[network.pairs]
@@ -86,6 +127,7 @@ def contact_sides(network: ContactNetwork) -> ContactSides:
         alpha=alpha[order],
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],
+        cuts=cuts,
     )
 
 
@@ -97,9 +139,14 @@ def check_arcs(sides: ContactSides) -> None:
     GeometryError
         Naming the first particle, the distance of the two arcs and their half-angles.
     """
-    particle, a, b = _overlapping_arcs(sides.offsets, sides.theta, sides.alpha)
+    refuse_overlap(sides.offsets, sides.theta, sides.alpha)
+
+
+def refuse_overlap(offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
+    """Raise the error of `check_arcs` for the arcs ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
+    particle, a, b = _overlapping_arcs(offsets, theta, alpha)
     if particle >= 0:
-        alpha, theta = np.degrees(sides.alpha[[a, b]]), np.degrees(sides.theta[[a, b]])
+        alpha, theta = np.degrees(alpha[[a, b]]), np.degrees(theta[[a, b]])
         apart = abs((theta[0] - theta[1] + 180.0) % 360.0 - 180.0)
         raise GeometryError(
             f"two contact arcs of particle {particle} overlap: {apart:.4g} degrees apart with half-angles "

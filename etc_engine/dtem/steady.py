@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.assembly import LinearSystem, assemble, count_positive_off_diagonals
 from etc_engine.dtem.element import Elements, Material
-from etc_engine.dtem.methods import find_method
-from etc_engine.dtem.sides import ContactSides, check_arcs, contact_sides
+from etc_engine.dtem.methods import find_method, flux_modes
+from etc_engine.dtem.sides import NO_CUTS, ContactSides, check_arcs, contact_sides, insulated_cuts
 from etc_engine.errors import InputError
-from etc_engine.percolation import Backbone, find_backbone
+from etc_engine.percolation import Backbone, find_backbone, restore_dead_ends
 from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
 
 
@@ -62,6 +62,11 @@ class SteadySolution:
     positive_off_diagonals: int
 
     @property
+    def modes(self) -> int:
+        """Flux modes of a contact."""
+        return int(self.flows.shape[1])
+
+    @property
     def heat_flows(self) -> NDArray[np.float64]:
         """Heat flow into the particle at each side, shape (s, k) [W/m]."""
         return self.flows[:, 0, :]
@@ -75,6 +80,7 @@ def solve_steady(
     conductivity: ArrayLike = 1.0,
     contact_resistance: ArrayLike = 0.0,
     tolerance: float = 1e-10,
+    modes: int | None = None,
     backbone: Backbone | None = None,
 ) -> SteadySolution:
     """Solve the discrete thermal element equations for one walled axis, or for periodic axes together.
@@ -97,6 +103,8 @@ def solve_steady(
         wall contact.
     tolerance : float
         Relative error of the conductivity left by the solver.
+    modes : int, optional
+        Flux modes of a contact, with ``arc`` or ``exact``; by default the method's own.
     backbone : Backbone, optional
         Of the same network and axes, if already known (it does not depend on the contact angles).
 
@@ -118,17 +126,21 @@ def solve_steady(
         _positive(conductivity, network.packing.count, "conductivity", zero=False),
         _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True),
     )
-    variant = find_method(method)
+    variant, modes = find_method(method), flux_modes(method, modes)
     if backbone is None:
         backbone = find_backbone(network, axes)
+    driven = driven_walls(network, axes)
+    cuts = NO_CUTS
+    if variant.exact_cuts:
+        backbone = restore_dead_ends(network, backbone)
+        cuts = insulated_cuts(network, driven)
     kept = np.concatenate([backbone.contacts, backbone.wall_contacts])
     reduced = network.select(backbone.contacts, backbone.wall_contacts)
-    sides = contact_sides(reduced)
+    sides = contact_sides(reduced, cuts)
     check_arcs(sides)
     if not kept.all():  # what carries no heat must still be a valid geometry
-        driven = np.asarray(network.walls // 2 == axes[0])
         check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), driven)))
-    elements = variant.elements(sides, replace(material, contact_resistance=material.contact_resistance[kept]))
+    elements = variant.elements(sides, replace(material, contact_resistance=material.contact_resistance[kept]), modes)
     system = _load(reduced, axes, backbone, sides, elements)
     u, reports = _solve(system, tolerance)
     temperatures = system.element_temperatures(elements, u)
@@ -146,6 +158,11 @@ def solve_steady(
         reports=reports,
         positive_off_diagonals=count_positive_off_diagonals(system.matrix),
     )
+
+
+def driven_walls(network: ContactNetwork, axes: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Wall contacts whose wall has a prescribed temperature, shape (w,)."""
+    return np.asarray((network.walls // 2 == axes[0]) & (not network.packing.box.periodic[axes[0]]))
 
 
 def _load(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,3 +87,14 @@ def test_heat_in_equals_heat_out_equals_energy(network):
     heat_in, heat_out = wall_heat_flows(result.solutions[0])
     assert heat_in == pytest.approx(result.tensor[0, 0], rel=1e-12)
     assert heat_out == pytest.approx(result.tensor[0, 0], rel=1e-12)
+
+
+def test_exact_reaches_the_converged_truth_with_three_modes(network):
+    value = effective_conductivity(network, method="exact", axes=(0,), tolerance=1e-12).tensor[0, 0]
+    assert value == pytest.approx(CONVERGED_TRUTH, abs=1e-7)
+
+
+def test_disks_cut_by_the_driven_walls_alone(network):
+    """0.2787795, of an independent prototype."""
+    uncut = replace(network, geometric=False)
+    assert effective_conductivity(uncut, method="exact", axes=(0,)).tensor[0, 0] == pytest.approx(0.2787795, abs=2e-7)

@@ -41,7 +41,9 @@ def literature_element(theta, alpha, method):
 def test_element_equals_the_literature_form_is_symmetric_and_semi_definite(feng_particles, method):
     network = overlap_contacts(feng_particles)
     sides = contact_sides(network)
-    elements = closed_form_elements(sides, Material(np.ones(12), np.zeros(network.count + network.walls.size)), method)
+    elements = closed_form_elements(
+        sides, Material(np.ones(12), np.zeros(network.count + network.walls.size)), method=method
+    )
     for p in range(12):
         rows = slice(elements.offsets[p], elements.offsets[p + 1])
         n = rows.stop - rows.start

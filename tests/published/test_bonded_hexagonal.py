@@ -1,0 +1,25 @@
+"""Bonded hexagonal lattice against converged finite elements of its unit cell (corner-graded P4 and P5)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from etc_engine.contacts import bonded_contacts
+from etc_engine.effective import effective_conductivity
+
+
+@pytest.mark.parametrize(
+    ("degrees", "value"), [(5, 0.62564), (10, 0.74811), (15, 0.84357), (20, 0.92121), (25, 0.97733)]
+)
+def test_conductivity_of_the_bonded_hexagonal_lattice(hexagonal, degrees, value):
+    tensor = effective_conductivity(bonded_contacts(hexagonal(), np.radians(degrees)), method="exact").tensor
+    np.testing.assert_allclose(tensor, value * np.eye(2), atol=6e-6)
+
+
+@pytest.mark.parametrize(("degrees", "error"), [(29.0, 1.1e-3), (29.9, 1e-4), (29.99, 6e-5)])
+def test_it_tends_to_the_solid_at_thirty_degrees(hexagonal, degrees, error):
+    """There the chords meet and the disks fill the plane."""
+    network = bonded_contacts(hexagonal(), np.radians(degrees))
+    value = effective_conductivity(network, method="exact", modes=7).tensor[0, 0]
+    assert 1.0 - error < value < 1.0
