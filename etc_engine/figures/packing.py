@@ -36,7 +36,7 @@ def draw_packing(packing: ParticlePacking) -> Figure:
     """Figure of a packing; walls are drawn solid, periodic sides dashed with the disks' images cut there."""
     width, height = packing.box.lengths[:2]
     size = 6.0 / max(width, height)
-    figure = new_figure(max(width * size, 2.0) + 1.0, max(height * size, 2.0))
+    figure = new_figure(max(width * size, 2.0) + 1.4, max(height * size, 1.5) + 0.8)
     axes = figure.add_subplot()
     centers, radii, depth = _seen(packing)
     spheres = packing.dimension == 3
