@@ -79,6 +79,6 @@ class Gatherer:
         if missing and time.monotonic() > deadline:
             raise OutputError(
                 f"{len(missing)} finished units do not appear in {self._reader.folder}: "
-                "do all ranks see the same folder? go on with --resume"
+                "do all ranks see the same folder?"
             )
         return len(missing)

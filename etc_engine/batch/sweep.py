@@ -139,7 +139,10 @@ def _run_rounds(
         if stopped:
             return table, communicator.add(DONE, 0), stopped
         written = shard_path(claim.folder, round_.shard, communicator.rank)
-        table = gatherer.gather_all(plan.units, written if written.exists() else None)
+        try:
+            table = gatherer.gather_all(plan.units, written if written.exists() else None)
+        except OutputError as error:
+            return table, communicator.add(DONE, 0), str(error)
         targets, computed = plan.targets, computed + len(plan.units)
     return table, computed, ""
 

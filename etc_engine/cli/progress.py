@@ -41,7 +41,7 @@ class Progress:
             self._bar = tqdm.tqdm(total=planned, initial=done, unit="unit", dynamic_ncols=True, file=sys.stderr)
         self._bar.total = planned
         if failed:
-            self._bar.set_postfix_str(f"{failed} failed", refresh=False)
+            self._bar.set_postfix_str(f"failed cells: {failed}", refresh=False)
         self._bar.update(done - self._bar.n)
 
     def __enter__(self) -> Progress:
@@ -60,8 +60,8 @@ def progress_line(done: int, planned: int, failed: int, computed: int, seconds: 
     Examples
     --------
     >>> progress_line(30, 120, 1, 20, 40.0)
-    'etc-engine: 30/120 units, 0.5 units/s, 180 s to go, 1 cells failed'
+    'etc-engine: 30/120 units, 0.5 units/s, 180 s to go, failed cells: 1'
     """
     rate = computed / seconds if seconds > 0.0 else 0.0
     left = f"{(planned - done) / rate:.0f} s to go" if rate else "no estimate yet"
-    return f"etc-engine: {done}/{planned} units, {rate:.3g} units/s, {left}, {failed} cells failed"
+    return f"etc-engine: {done}/{planned} units, {rate:.3g} units/s, {left}, failed cells: {failed}"

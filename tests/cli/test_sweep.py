@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import signal
 import subprocess
@@ -276,3 +277,26 @@ def test_a_folder_that_may_not_be_written_is_refused(stand_in, study, tmp_path):
     done = stand_in(study, "-o", closed / "out.nc")
     assert done.returncode == 2
     assert "cannot write in" in done.stderr
+
+
+def test_a_density_the_packer_does_not_reach_is_a_record(etc_engine, study, tmp_path):
+    study.write_text(STUDY.replace("[0.65, 0.7]", "[0.5, 0.9]").replace("0.01:0.02", "0.03:0.06").replace("= 5", "= 2"))
+    done = etc_engine("sweep", study, "-o", tmp_path / "out.nc")
+    assert done.returncode == 4
+    assert "4 packing_failed" in done.stdout
+    data = open_dataset(tmp_path / "out.nc").sel(density=0.9)
+    assert (data["status"] == 2).all()
+    assert data["conductivity_mean"].isnull().all()
+    assert (data["count"] == 0).all()
+    assert all("density 0.9 is above the packing's own" in text for text in data["message"].values.ravel())
+
+
+def test_units_of_another_version_are_told_on_resume(stand_in, study, tmp_path):
+    output = tmp_path / "out.nc"
+    interrupted(study, output, tmp_path / "log", signal.SIGTERM)
+    (run,) = output.with_name("out.nc.shards").glob("*.run")
+    run.write_text(run.read_text().replace('"engine": "', '"engine": "0.0.1 then '))
+    resumed = stand_in(study, "-o", output, "--policy", "resume")
+    assert resumed.returncode == 0
+    assert "finished units come from etc_engine 0.0.1 then" in resumed.stderr
+    assert len(json.loads(open_dataset(output).attrs["runs"])) == 2

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -77,6 +79,32 @@ def test_adaptive_rounds_are_the_same_for_any_number_of_ranks(study, tmp_path):
     assert differing_variables(results[0], results[2]) == []
     assert results[0].sizes["realization"] == 60
     assert 6 < results[0]["count"].max() <= 60
+
+
+@needs_mpi
+def test_a_warning_to_the_launcher_stops_all_ranks_and_another_number_of_ranks_goes_on(study, tmp_path):
+    output, log = tmp_path / "out.nc", tmp_path / "log"
+    options = ["-o", str(output), "--seconds", "0.2", "--log", str(log)]
+    running = subprocess.Popen(
+        [str(MPIEXEC), "-n", "2", sys.executable, str(STAND_IN), str(study), *options],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60.0
+    while not log.exists() or len(log.read_text().splitlines()) < 4:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    running.send_signal(signal.SIGTERM)
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == 75, errors
+    assert sum("stopped early (SIGTERM)" in line for line in errors.splitlines()) == 1
+    before = len(log.read_text().splitlines())
+    resumed = stand_in(3, study, *options, "--policy", "resume")
+    assert resumed.returncode == 0, resumed.stderr
+    assert f"{before} of 24 units are finished already" in resumed.stderr
+    assert len(log.read_text().splitlines()) == 24  # none was computed twice
+    assert stand_in(0, study, "-o", tmp_path / "whole.nc").returncode == 0
+    assert differing_variables(open_dataset(output), open_dataset(tmp_path / "whole.nc")) == []
 
 
 @needs_mpi

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from etc_engine.batch import gathering
 from etc_engine.batch.plan import Unit
 from etc_engine.batch.records import Record, decode, encode, failed_realization
+from etc_engine.batch.scheduler import Solo
 from etc_engine.batch.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
 from etc_engine.batch.study import parse_study
 from etc_engine.batch.table import join, tabulate
@@ -185,3 +187,23 @@ def test_an_atomic_write_replaces_whole_files_only(tmp_path, monkeypatch):
 
 def _no_space(_file):
     raise OSError(28, "No space left on device")
+
+
+def test_units_that_do_not_appear_are_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(gathering, "VISIBLE_SECONDS", 0.0)
+    with ShardWriter(tmp_path, "run", 0) as writer:
+        writer.append(record(0))
+    gatherer = gathering.Gatherer(STUDY, tmp_path, Solo())
+    assert gatherer.gather_all(np.array([[0, 0]])).units.tolist() == [[0, 0]]
+    with pytest.raises(OutputError, match=r"2 finished units do not appear .* the same folder"):
+        gatherer.gather_all(np.array([[0, 0], [0, 1], [0, 2]]))
+
+
+def test_a_shard_that_the_folder_does_not_show_yet_is_read_by_name(tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    with ShardWriter(elsewhere, "run", 0) as writer:
+        writer.append(record(1))
+    gatherer = gathering.Gatherer(STUDY, tmp_path, Solo())
+    assert gatherer.gather(elsewhere / "not-yet.shard").units.size == 0
+    assert gatherer.gather(writer.path).units.tolist() == [[0, 1]]

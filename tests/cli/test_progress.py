@@ -1,0 +1,42 @@
+"""The progress of a sweep on a terminal and in a log."""
+
+from __future__ import annotations
+
+import re
+import sys
+
+from etc_engine.cli import progress
+from etc_engine.cli.progress import Progress, progress_line
+
+
+def test_a_log_is_left_alone_for_a_minute(capsys):
+    with Progress() as shown:
+        for done in range(50):
+            shown.report(done, 100, 0)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_log_gets_one_line_for_each_period(capsys, monkeypatch):
+    clock = iter(range(0, 1000, 25))
+    monkeypatch.setattr(progress.time, "monotonic", lambda: float(next(clock)))
+    with Progress() as shown:
+        for done in range(10):
+            shown.report(20 + done, 120, 2)
+    lines = capsys.readouterr().err.splitlines()
+    assert 2 <= len(lines) <= 5
+    assert re.fullmatch(r"etc-engine: 2\d/120 units, 0\.0\d+ units/s, \d+ s to go, failed cells: 2", lines[0]), lines[0]
+
+
+def test_units_of_an_earlier_run_do_not_count_for_the_rate():
+    assert "0.1 units/s, 100 s to go" in progress_line(90, 100, 0, 10, 100.0)
+    assert "no estimate yet" in progress_line(90, 100, 0, 0, 0.0)
+
+
+def test_a_terminal_gets_a_bar(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with Progress() as shown:
+        shown.report(30, 120, 0)
+        shown.report(120, 120, 3)
+    bar = capsys.readouterr().err
+    assert "120/120" in bar
+    assert "failed cells: 3" in bar
