@@ -22,9 +22,7 @@ KINDS = {"meshless": "etc_engine.meshless.study:run_study"}
 
 @click.command("transient")
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", "output", required=True, type=click.Path(path_type=Path), help="netCDF file to write."
-)
+@click.option("-o", "--output", "output", required=True, type=click.Path(path_type=Path), help="netCDF file to write.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing output file.")
 def transient_command(study: Path, output: Path, overwrite: bool) -> None:
     """Run the transient STUDY (a TOML file with schema and kind) and write the fields to a netCDF file."""
@@ -58,9 +56,7 @@ def read_study(path: Path) -> tuple[dict[str, Any], str]:
     if content.get("schema") != 1:
         raise StudyError(f"{path}: schema = 1 is expected, found {content.get('schema')!r}")
     if content.get("kind") not in KINDS:
-        raise StudyError(
-            f"{path}: kind = {content.get('kind')!r} is unknown: expected one of {', '.join(KINDS)}"
-        )
+        raise StudyError(f"{path}: kind = {content.get('kind')!r} is unknown: expected one of {', '.join(KINDS)}")
     return content, text
 
 

@@ -236,18 +236,14 @@ def _with_arcs(
 def _heat_at(heat: Sequence[HeatHistory], t: float) -> Array:
     values = np.array([history(t) if callable(history) else history for history in heat], dtype=float)
     if not np.isfinite(values).all():
-        raise InputError(
-            f"the heat through the contact arcs is not finite at t = {t:g}: found {values.tolist()}"
-        )
+        raise InputError(f"the heat through the contact arcs is not finite at t = {t:g}: found {values.tolist()}")
     return values
 
 
 def _covered(arc: ContactArc, angle: Array, cell: float) -> Array:
     """Part of the cell of width ``cell`` about each angle that the arc covers: heat is kept exactly."""
     distance = np.abs(np.mod(angle - arc.theta + np.pi, 2.0 * np.pi) - np.pi)
-    overlap = np.minimum(distance + 0.5 * cell, arc.half_angle) - np.maximum(
-        distance - 0.5 * cell, -arc.half_angle
-    )
+    overlap = np.minimum(distance + 0.5 * cell, arc.half_angle) - np.maximum(distance - 0.5 * cell, -arc.half_angle)
     return np.clip(overlap / cell, 0.0, 1.0)
 
 

@@ -148,9 +148,7 @@ def lay_out(problem: HeatProblem, discretization: Discretization, method: Method
     spacing = node_layouts.refuse_duplicates(nodes)
     functions = discretization.functions or max(1, collocation.count // OVERSAMPLING)
     if functions > collocation.count:
-        raise InputError(
-            f"{functions} functions for {collocation.count} boundary nodes: expected at most one per node"
-        )
+        raise InputError(f"{functions} functions for {collocation.count} boundary nodes: expected at most one per node")
     sources = _place_sources(problem, discretization, functions, radius) if method == "mfs" else None
     return Layout(
         problem=problem,
@@ -177,22 +175,16 @@ def _collocation_nodes(problem: HeatProblem, discretization: Discretization) -> 
     collocation = node_layouts.boundary_nodes_at(problem.domain, np.asarray(boundary), fixed)
     missing = set(range(len(problem.boundary))) - set(collocation.edges.tolist())
     if missing:
-        raise InputError(
-            f"no boundary node belongs to edge {min(missing)}: its condition would be lost; add some"
-        )
+        raise InputError(f"no boundary node belongs to edge {min(missing)}: its condition would be lost; add some")
     return collocation
 
 
 def _check_nodes(problem: HeatProblem, collocation: BoundaryNodes) -> BoundaryNodes:
     """Points between the collocation points, where the boundary residual is measured."""
-    return node_layouts.boundary_nodes(
-        problem.domain, max(collocation.count + 7, 3 * len(problem.boundary)), "uniform"
-    )
+    return node_layouts.boundary_nodes(problem.domain, max(collocation.count + 7, 3 * len(problem.boundary)), "uniform")
 
 
-def _place_sources(
-    problem: HeatProblem, discretization: Discretization, functions: int, radius: float
-) -> Array:
+def _place_sources(problem: HeatProblem, discretization: Discretization, functions: int, radius: float) -> Array:
     domain, boundary = problem.domain, discretization.boundary
     if isinstance(boundary, int | np.integer):
         least = 3 * len(problem.boundary)

@@ -356,9 +356,7 @@ def _refuse_improper(vertices: Array) -> None:
         j = (i + 1) % n
         sine, cosine = _cross(edges[i], edges[j]), np.dot(edges[i], edges[j])
         if cosine < 0.0 and abs(sine) <= 1e-12 * lengths[i] * lengths[j]:
-            raise GeometryError(
-                f"polygon edge {j} folds back on edge {i} at vertex {j}: found a corner of angle 0"
-            )
+            raise GeometryError(f"polygon edge {j} folds back on edge {i} at vertex {j}: found a corner of angle 0")
         for k in range(i + 2, n if i else n - 1):
             if _segments_meet(vertices[i], edges[i], vertices[k], edges[k]):
                 raise GeometryError(

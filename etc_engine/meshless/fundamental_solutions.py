@@ -18,9 +18,7 @@ CROWDED = 0.6
 ON_BOUNDARY = 1e-6
 
 
-def fundamental_solutions(
-    points: Array, sources: Array, nearest: Array, lam: complex
-) -> tuple[Field, Field, Field]:
+def fundamental_solutions(points: Array, sources: Array, nearest: Array, lam: complex) -> tuple[Field, Field, Field]:
     """Scaled fundamental solutions K_0(lambda r)/K_0(lambda d) and their gradients.
 
     Each source's function is one at the distance d of the boundary point nearest to it, so that no
@@ -81,9 +79,7 @@ def offset_sources(domain: Domain, points: Array, normals: Array, offset: float)
     clearance = domain.edge_distances(candidates).min(axis=1)
     kept = candidates[~domain.contains(candidates) & (clearance >= CROWDED * offset)]
     if len(kept) == 0:
-        raise GeometryError(
-            f"no source fits outside the body at a distance of {offset:g} m: choose a smaller one"
-        )
+        raise GeometryError(f"no source fits outside the body at a distance of {offset:g} m: choose a smaller one")
     return np.asarray(kept)
 
 

@@ -128,9 +128,7 @@ def _values(layout: Layout, lam: complex, points: Array) -> tuple[Field, Field]:
     return particular, _homogeneous(layout, lam, points)[0]
 
 
-def _gradients(
-    layout: Layout, lam: complex, points: Array
-) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
+def _gradients(layout: Layout, lam: complex, points: Array) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
     nodes = layout.scaled(layout.nodes)
     xp, yp = particular_gradients(layout.discretization.basis, nodes, points, lam, _reach(layout))
     _, xh, yh = _homogeneous(layout, lam, points)

@@ -12,9 +12,7 @@ from etc_engine.errors import InputError
 TALBOT_NODES = 16
 
 
-def talbot_nodes(
-    t: float, count: int = TALBOT_NODES
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def talbot_nodes(t: float, count: int = TALBOT_NODES) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Nodes s and weights w of the modified Talbot contour: f(t) = Re sum_k w_k F(s_k).
 
     The contour s(x) = (count/t) (-0.6122 + 0.5017 x cot(0.6407 x) + 0.2645 i x) is walked at midpoints;

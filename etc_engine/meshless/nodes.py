@@ -94,9 +94,7 @@ def boundary_nodes_at(domain: Domain, points: Array, dirichlet: NDArray[np.bool_
             f"boundary node {first} at {points[first].tolist()} is {gap[first]:.3g} m away from the boundary"
         )
     if isinstance(domain, Polygon):
-        edges = np.argmin(
-            np.where(distances <= 1e-9 * size, np.where(dirichlet, 0.0, 1.0), 2.0 + distances), axis=1
-        )
+        edges = np.argmin(np.where(distances <= 1e-9 * size, np.where(dirichlet, 0.0, 1.0), 2.0 + distances), axis=1)
     else:
         edges = domain.nearest_edge(points)
     return BoundaryNodes(points, domain.normals_at(points, edges), edges.astype(np.int64))
@@ -132,9 +130,7 @@ def _lattice(domain: Domain, step: float, margin: float) -> Array:
     grid = grid[domain.contains(grid)]
     grid = grid[domain.edge_distances(grid).min(axis=1) > max(margin, 1e-6 * step)] if len(grid) else grid
     if len(grid) == 0:
-        raise GeometryError(
-            f"no node of a lattice with spacing {step:g} m falls inside the body: ask for more nodes"
-        )
+        raise GeometryError(f"no node of a lattice with spacing {step:g} m falls inside the body: ask for more nodes")
     return np.asarray(grid)
 
 

@@ -63,9 +63,7 @@ def _inverse_laplacian(polynomial: Polynomial) -> Polynomial:
     result: Polynomial = {}
     for (a, b), value in polynomial.items():
         for j in range(b // 2 + 1):
-            factor = (
-                (-1.0) ** j * factorial(a) / factorial(a + 2 * j + 2) * factorial(b) / factorial(b - 2 * j)
-            )
+            factor = (-1.0) ** j * factorial(a) / factorial(a + 2 * j + 2) * factorial(b) / factorial(b - 2 * j)
             powers = (a + 2 * j + 2, b - 2 * j)
             result[powers] = result.get(powers, 0.0) + factor * value
     return result
@@ -91,9 +89,7 @@ def _rising(polynomial: Polynomial, lam: complex) -> Polynomial:
     return result
 
 
-def _evaluate(
-    polynomials: list[Polynomial], points: Array, complex_valued: bool
-) -> tuple[Field, Field, Field]:
+def _evaluate(polynomials: list[Polynomial], points: Array, complex_valued: bool) -> tuple[Field, Field, Field]:
     dtype = complex if complex_valued else float
     highest = max((a + b for polynomial in polynomials for a, b in polynomial), default=0)
     x, y = (np.vander(column, highest + 1, increasing=True) for column in np.asarray(points, dtype=float).T)

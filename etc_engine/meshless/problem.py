@@ -193,15 +193,11 @@ class HeatProblem:
             if not (isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0.0):
                 raise InputError(f"the {name} must be a positive finite number, found {value!r}")
         if (self.vertices is None) == (self.disk is None):
-            raise InputError(
-                "a heat problem needs either polygon vertices or a disk: give exactly one of them"
-            )
+            raise InputError("a heat problem needs either polygon vertices or a disk: give exactly one of them")
         boundary = tuple(self.boundary)
         edges = len(self.domain.edge_lengths)
         if len(boundary) != edges:
-            raise InputError(
-                f"the body has {edges} edges but {len(boundary)} boundary conditions: give one per edge"
-            )
+            raise InputError(f"the body has {edges} edges but {len(boundary)} boundary conditions: give one per edge")
         for edge, condition in enumerate(boundary):
             if not isinstance(condition, Dirichlet | Neumann | Convective):
                 raise InputError(
@@ -253,9 +249,7 @@ def sample(data: Data, points: Array, t: float, what: str) -> Array:
             f"expected ({len(points)},) or one number (x[:, 0] is the first coordinate)"
         )
     if not np.isfinite(values).all():
-        raise InputError(
-            f"{what} is not finite at t = {t:g}: found {values[~np.isfinite(values)].ravel()[0]}"
-        )
+        raise InputError(f"{what} is not finite at t = {t:g}: found {values[~np.isfinite(values)].ravel()[0]}")
     return np.broadcast_to(values, (len(points),)).copy()
 
 

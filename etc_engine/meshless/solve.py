@@ -146,9 +146,7 @@ def solve_transient(
     )
 
 
-def _solve_marching(
-    probe: Probe, scheme: str, times: Array, steps: int, diagnostics: Diagnostics
-) -> list[Observation]:
+def _solve_marching(probe: Probe, scheme: str, times: Array, steps: int, diagnostics: Diagnostics) -> list[Observation]:
     """Readings at positive times; each step operator is judged when it is first used."""
     if steps < 1 or int(steps) != steps:
         raise InputError(f"at least one whole time step is needed, found steps = {steps}")
@@ -188,9 +186,7 @@ def _solve_laplace(probe: Probe, t: float, diagnostics: Diagnostics) -> Observat
         for edge, condition in enumerate(problem.boundary):
             mine = layout.collocation.edges == edge
             what = f"the boundary condition of edge {edge}"
-            values = transformed(
-                condition.data, condition.transform, layout.collocation.points[mine], s, what
-            )
+            values = transformed(condition.data, condition.transform, layout.collocation.points[mine], s, what)
             data[mine] = condition.factor * values
         coefficients = operator.solve(-(layout.scale**2) * (initial + heating / problem.conductivity), data)
         part = observe(probe, operator, coefficients[:, None]).weighted(np.array([[weight]]))
@@ -231,13 +227,9 @@ def _check_transforms(layout: Layout, t: float) -> None:
     for what, data, transform, points in sites:
         if transform is None:
             continue
-        given = np.broadcast_to(
-            np.asarray(data(points, t) if callable(data) else data, dtype=float), len(points)
-        )
+        given = np.broadcast_to(np.asarray(data(points, t) if callable(data) else data, dtype=float), len(points))
         s, w = talbot_nodes(t)
-        back = sum(
-            wk * transformed(data, transform, points, sk, what) for sk, wk in zip(s, w, strict=True)
-        ).real
+        back = sum(wk * transformed(data, transform, points, sk, what) for sk, wk in zip(s, w, strict=True)).real
         size = np.abs(given).max() + np.abs(back).max()
         worst = int(np.argmax(np.abs(back - given)))
         if abs(back[worst] - given[worst]) > max(TRANSFORM_TOLERANCE * size, 1e-12):
@@ -279,9 +271,7 @@ def _checked_points(problem: HeatProblem, points: Sequence[Sequence[float]] | Ar
     return values
 
 
-def _dataset(
-    layout: Layout, scheme: str, times: Array, points: Array, readings: list[Observation]
-) -> xarray.Dataset:
+def _dataset(layout: Layout, scheme: str, times: Array, points: Array, readings: list[Observation]) -> xarray.Dataset:
     import xarray
 
     def stacked(name: str) -> Array:

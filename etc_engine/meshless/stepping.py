@@ -148,9 +148,7 @@ def march(library: StepLibrary, scheme: str, times: Array, steps: int) -> Iterat
         yield Snapshot(float(end), state.values, state.step, state.source, state.data)
 
 
-def _implicit(
-    step: StepOperator, layout: Layout, base: Array, t: float, data: Array | None = None
-) -> Snapshot:
+def _implicit(step: StepOperator, layout: Layout, base: Array, t: float, data: Array | None = None) -> Snapshot:
     """Solve (lap - lambda^2) u = -lambda^2 base - Q(t)/k with the boundary data of time t, or those given."""
     heating = layout.problem.source_values(layout.nodes, t) / layout.problem.conductivity
     source = -(step.lam**2) * base - layout.scale**2 * heating
@@ -183,9 +181,7 @@ def _bdf2(library: StepLibrary, values: Array, previous: Array | None, t: float,
     return _implicit(library.get(1.5, tau), library.layout, (4.0 * values - previous) / 3.0, t + tau)
 
 
-def _crank_nicolson(
-    library: StepLibrary, values: Array, state: Snapshot | None, t: float, tau: float
-) -> Snapshot:
+def _crank_nicolson(library: StepLibrary, values: Array, state: Snapshot | None, t: float, tau: float) -> Snapshot:
     """u_new = 2 w - u, where w solves with the mean of old and new boundary data and sources."""
     layout, step = library.layout, library.get(2.0, tau)
     if state is None:
@@ -195,13 +191,9 @@ def _crank_nicolson(
         layout.problem.source_values(layout.nodes, t) + layout.problem.source_values(layout.nodes, t + tau)
     )
     source = -(step.lam**2) * values - layout.scale**2 * heating / layout.problem.conductivity
-    data = 0.5 * (
-        layout.boundary_data(layout.collocation, t) + layout.boundary_data(layout.collocation, t + tau)
-    )
+    data = 0.5 * (layout.boundary_data(layout.collocation, t) + layout.boundary_data(layout.collocation, t + tau))
     middle = step.nodal(source, data)
-    return Snapshot(
-        t + tau, 2.0 * middle - values, step, 2.0 * source - state.source, 2.0 * data - state.data
-    )
+    return Snapshot(t + tau, 2.0 * middle - values, step, 2.0 * source - state.source, 2.0 * data - state.data)
 
 
 def spectral_radius(step: StepOperator, scheme: str) -> float:

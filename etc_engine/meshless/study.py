@@ -70,9 +70,7 @@ class Edge(_Strict):
     """Boundary condition of one edge."""
 
     type: Literal["dirichlet", "neumann", "convective"]
-    value: Value = Field(
-        description="temperature [K], heat flux into the body [W/m2] or ambient temperature [K]"
-    )
+    value: Value = Field(description="temperature [K], heat flux into the body [W/m2] or ambient temperature [K]")
     coefficient: Positive | None = Field(default=None, description="heat transfer coefficient [W/(m2 K)]")
 
     @model_validator(mode="after")
@@ -132,11 +130,7 @@ class MeshlessStudy(_Strict):
             raise ValueError("[output] needs points or a grid")
         if self.contact and (self.body.disk is None or self.boundary):
             raise ValueError("[[contact]] goes with a disk, and instead of [[boundary]]")
-        if (
-            self.contact
-            and self.body.disk is not None
-            and (self.body.disk.breaks or any(self.body.disk.center))
-        ):
+        if self.contact and self.body.disk is not None and (self.body.disk.breaks or any(self.body.disk.center)):
             raise ValueError("a disk with [[contact]] sits at the origin and has no breaks")
         if self.contact and (self.solver.method != "trefftz" or self.body.source != 0.0):
             raise ValueError("a disk with [[contact]] is solved by Trefftz functions and has no source")
@@ -218,10 +212,7 @@ def _run_contacts(study: MeshlessStudy) -> xarray.Dataset:
     )
     return heat_disk_through_arcs(
         [ContactArc(np.radians(contact.angle), np.radians(contact.half_angle)) for contact in study.contact],
-        [
-            contact.heat.at if isinstance(contact.heat, TimeTable) else contact.heat
-            for contact in study.contact
-        ],
+        [contact.heat.at if isinstance(contact.heat, TimeTable) else contact.heat for contact in study.contact],
         study.output.times,
         radius=study.body.disk.radius,
         conductivity=study.body.conductivity,

@@ -160,9 +160,7 @@ def figure_time_step() -> None:
     steps = 1.2 / counts
     axes.loglog(steps, 3.0 * steps, "k:", lw=1, label="order 1")
     axes.loglog(steps, 1.0 * steps**2, "k--", lw=1, label="order 2")
-    axes.set(
-        xlabel="time step [s]", ylabel="relative error at t = 1.2 s", title="Example 1: error over time step"
-    )
+    axes.set(xlabel="time step [s]", ylabel="relative error at t = 1.2 s", title="Example 1: error over time step")
     axes.legend()
     axes.grid(alpha=0.3)
     save(figure, "error_over_time_step")
@@ -183,9 +181,7 @@ def figure_condition() -> None:
             )  # fmt: skip
             used.append(result.attrs["functions"])
             conditions.append(result.attrs["boundary_condition_number"])
-            errors.append(
-                paper.relative_error(result.temperature.values[0], paper.exact_1(paper.POINTS_1, 1.2))
-            )
+            errors.append(paper.relative_error(result.temperature.values[0], paper.exact_1(paper.POINTS_1, 1.2)))
             rows.append([method, used[-1], conditions[-1], result.attrs["boundary_rank"], errors[-1]])
         left.semilogy(used, conditions, "o-", label=method)
         right.semilogy(used, errors, "o-", label=method)
@@ -195,9 +191,7 @@ def figure_condition() -> None:
         axes.grid(alpha=0.3)
         axes.legend()
     save(figure, "condition_number")
-    write_table(
-        "condition_number", ["method", "functions", "condition number", "rank", "relative error"], rows
-    )
+    write_table("condition_number", ["method", "functions", "condition number", "rank", "relative error"], rows)
 
 
 def figure_maps() -> None:
@@ -244,9 +238,7 @@ def figure_contact_arcs() -> None:
         right.loglog(fourier, gap, "o-", ms=3, color=f"C{color}", label=name)
         drift = float(np.abs(result.mean_temperature.values - sum(heat) * fourier / np.pi).max())
         below = fourier[gap < 0.01]
-        within = (
-            float(np.exp(np.interp(-np.log(0.01), -np.log(gap), np.log(fourier)))) if len(below) else np.nan
-        )
+        within = float(np.exp(np.interp(-np.log(0.01), -np.log(gap), np.log(fourier)))) if len(below) else np.nan
         rows.append([name, float(lumped[0, 0]), float(rise[-1, 0]), within, drift])
     right.axhline(0.01, color="k", lw=0.8, ls="--")
     left.set(xlabel="Fourier number  κt/(ρc R²)", ylabel="(T₁ − T₀) κ / (1 W/m)")

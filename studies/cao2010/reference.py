@@ -84,22 +84,16 @@ def example(number: int, lag: float = 0.0) -> HeatProblem:
     """The three examples; ``lag`` delays the boundary values of the third."""
     if number == 3:
         boundary = [Dirichlet(lambda x, t: exact_3(x, t - lag), lambda x, s: shape_3(x) / (s + 5.0))] * 6
-        return HeatProblem(
-            vertices=L_SHAPE, conductivity=1.0, heat_capacity=1.0, initial=shape_3, boundary=boundary
-        )
+        return HeatProblem(vertices=L_SHAPE, conductivity=1.0, heat_capacity=1.0, initial=shape_3, boundary=boundary)
     sides = [Dirichlet(0.0)] * 3 + [Dirichlet(0.0) if number == 1 else Neumann(0.0)]
-    return HeatProblem(
-        vertices=SQUARE, conductivity=CONDUCTIVITY, heat_capacity=1.0, initial=INITIAL, boundary=sides
-    )
+    return HeatProblem(vertices=SQUARE, conductivity=CONDUCTIVITY, heat_capacity=1.0, initial=INITIAL, boundary=sides)
 
 
 def square_boundary() -> np.ndarray:
     """40 boundary nodes of the square, spacing 0.3, corners included."""
     s = 0.3 * np.arange(10)
     zero, full = np.zeros(10), np.full(10, SIDE)
-    return np.vstack(
-        [np.column_stack(side) for side in ((s, zero), (full, s), (SIDE - s, full), (zero, SIDE - s))]
-    )
+    return np.vstack([np.column_stack(side) for side in ((s, zero), (full, s), (SIDE - s, full), (zero, SIDE - s))])
 
 
 def square_interior() -> np.ndarray:

@@ -97,9 +97,7 @@ def test_table_3_is_25_steps(method):
 
 @pytest.mark.parametrize("order, degree", TABLE_2)
 def test_table_2_splines(order, degree):
-    found = euler(
-        square(), POINTS_1, PolyharmonicSpline(order, degree), method="trefftz", time=1.25, steps=25
-    )
+    found = euler(square(), POINTS_1, PolyharmonicSpline(order, degree), method="trefftz", time=1.25, steps=25)
     # orders 2 and 5 with polynomials differ in the third decimal of the outer points
     tolerance = 2.5e-3 if degree in (2, 5) else 6e-4
     np.testing.assert_allclose(found, TABLE_2[order, degree], atol=tolerance)

@@ -42,9 +42,7 @@ HEAT = [1.0, -0.4]
 def test_arc_temperatures_after_a_step_of_heat(scheme, tolerance):
     times = [0.05, 0.5]
     result = heat_disk_through_arcs(ARCS, HEAT, times, scheme=scheme)
-    for found, mean, t in zip(
-        result.arc_temperature.values, result.mean_temperature.values, times, strict=True
-    ):
+    for found, mean, t in zip(result.arc_temperature.values, result.mean_temperature.values, times, strict=True):
         np.testing.assert_allclose(found, exact_arc_temperatures(ARCS, HEAT, t), atol=tolerance)
         assert mean == pytest.approx(0.6 * t / np.pi, abs=1e-3)
     assert result.warnings == ""

@@ -41,9 +41,7 @@ def test_radial_particular_solutions(basis, lam):
     along = (slope(r + step) - slope(r - step)) / (2 * step) * r + 2.0 * slope(r)
     residual = along - lam**2 * basis.particular(r, lam, reach) - basis.value(r, lam)
     assert np.abs(residual).max() < 1e-6 * np.abs(along).max()
-    difference = (basis.particular(r + step, lam, reach) - basis.particular(r - step, lam, reach)) / (
-        2 * step
-    )
+    difference = (basis.particular(r + step, lam, reach) - basis.particular(r - step, lam, reach)) / (2 * step)
     np.testing.assert_allclose(difference, slope(r) * r, atol=1e-6 * np.abs(slope(r)).max())
 
 
@@ -53,9 +51,7 @@ def test_thin_plate_particular_solution_is_equation_23():
     found = PolyharmonicSpline(1).particular(r, lam, reach=2.0)
     np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-16)
     at_zero = -4 / lam**4 + 4 * np.euler_gamma / lam**4 + 4 / lam**4 * np.log(lam / 2)
-    assert PolyharmonicSpline(1).particular(np.zeros(1), lam, reach=2.0)[0] == pytest.approx(
-        at_zero, rel=1e-12
-    )
+    assert PolyharmonicSpline(1).particular(np.zeros(1), lam, reach=2.0)[0] == pytest.approx(at_zero, rel=1e-12)
 
 
 @pytest.mark.parametrize("lam", LAMBDAS)
@@ -74,9 +70,7 @@ def test_trefftz_functions_solve_the_homogeneous_equation(points, lam):
     residual = laplacian(lambda x: trefftz_functions(x, lam, 15)[1:], points) - lam**2 * value
     assert np.abs(residual).max() < 2e-6 * (1.0 + abs(lam) ** 2)
     step = np.array([1e-5, 0.0])
-    difference = (
-        trefftz_functions(points + step, lam, 15)[0] - trefftz_functions(points - step, lam, 15)[0]
-    ) / 2e-5
+    difference = (trefftz_functions(points + step, lam, 15)[0] - trefftz_functions(points - step, lam, 15)[0]) / 2e-5
     np.testing.assert_allclose(difference, trefftz_functions(points, lam, 15)[1], atol=1e-6)
 
 
@@ -119,9 +113,7 @@ def test_quadratures_agree_by_the_divergence_theorem(domain):
     at, normals, lengths = boundary_quadrature(domain, 12)
     flux = at[:, 0] ** 3 * normals[:, 0] + at[:, 0] * at[:, 1] ** 2 * normals[:, 1]
     assert float(lengths @ flux) == pytest.approx(area, rel=1e-9)
-    assert weights.sum() == pytest.approx(domain.area) and lengths.sum() == pytest.approx(
-        domain.edge_lengths.sum()
-    )
+    assert weights.sum() == pytest.approx(domain.area) and lengths.sum() == pytest.approx(domain.edge_lengths.sum())
 
 
 @pytest.mark.parametrize("spacing", ["uniform", "chebyshev"])
@@ -157,9 +149,7 @@ def test_spectral_radius_of_large_systems_is_that_of_small_ones(scheme, order, m
     problem = HeatProblem(
         vertices=L_SHAPE, conductivity=1.0, heat_capacity=1.0, initial=1.0, boundary=[Dirichlet(0.0)] * 6
     )
-    layout = lay_out(
-        problem, Discretization(boundary=60, interior=150, basis=PolyharmonicSpline(order)), "trefftz"
-    )
+    layout = lay_out(problem, Discretization(boundary=60, interior=150, basis=PolyharmonicSpline(order)), "trefftz")
     step = StepLibrary(layout).get(FACTORS[scheme], 0.02)
     dense = spectral_radius(step, scheme)
     monkeypatch.setattr(stepping, "DENSE_LIMIT", 10)

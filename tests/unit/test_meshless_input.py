@@ -37,9 +37,7 @@ def unit_square(**changes):
 
 
 def solve(problem=None, times=(0.1,), points=CENTER, discretization=SMALL, **options):
-    return solve_transient(
-        problem or unit_square(), list(times), points, discretization=discretization, **options
-    )
+    return solve_transient(problem or unit_square(), list(times), points, discretization=discretization, **options)
 
 
 @pytest.mark.parametrize(
@@ -155,9 +153,7 @@ def test_boundary_functions_that_answer_nonsense(data, message):
 def test_laplace_needs_transforms():
     moving = Dirichlet(lambda _, t: np.sin(t))
     with pytest.raises(InputError, match="edge 1 is a function without a Laplace transform"):
-        solve(
-            unit_square(boundary=[Dirichlet(0.0), moving, Dirichlet(0.0), Dirichlet(0.0)]), scheme="laplace"
-        )
+        solve(unit_square(boundary=[Dirichlet(0.0), moving, Dirichlet(0.0), Dirichlet(0.0)]), scheme="laplace")
 
 
 def test_laplace_refuses_a_foreign_transform():

@@ -132,9 +132,7 @@ def test_convective_square_against_its_series(method, scheme, tolerance):
     assert relative_error(result.temperature.values[0], exact) < tolerance
 
 
-@pytest.mark.parametrize(
-    "scheme, order", [("backward-euler", 1), ("bdf2", 2), ("sdirk2", 2), ("crank-nicolson", 2)]
-)
+@pytest.mark.parametrize("scheme, order", [("backward-euler", 1), ("bdf2", 2), ("sdirk2", 2), ("crank-nicolson", 2)])
 def test_order_in_time(scheme, order):
     points = np.random.default_rng(12).uniform(0.0, 1.0, (50, 2))
     exact = 5.0 + 5.0 * robin_slab(points[:, 0], 0.3, 1.5) * robin_slab(points[:, 1], 0.3, 1.5)
@@ -202,12 +200,8 @@ def test_heat_flux_is_fouriers_law():
     result = solve_transient(problem, [0.4], points[:40], scheme="laplace", discretization=SMALL)
     x, y = points[:40].T
     decay = np.exp(-2.0)
-    flux = np.column_stack(
-        [3.0 * np.sin(3.0 * x) * np.sinh(2.0 * y), -2.0 * np.cos(3.0 * x) * np.cosh(2.0 * y)]
-    )
-    np.testing.assert_allclose(
-        result.heat_flux.values[0], flux * decay, atol=2e-4 * np.abs(flux).max() * decay
-    )
+    flux = np.column_stack([3.0 * np.sin(3.0 * x) * np.sinh(2.0 * y), -2.0 * np.cos(3.0 * x) * np.cosh(2.0 * y)])
+    np.testing.assert_allclose(result.heat_flux.values[0], flux * decay, atol=2e-4 * np.abs(flux).max() * decay)
 
 
 def test_initial_time_answers_the_initial_state():
