@@ -120,10 +120,8 @@ def large_system() -> None:
     judged = time.perf_counter()
     source, data = np.ones(len(layout.nodes)), np.ones(layout.collocation.count)
     seconds, _ = best_of(20, lambda: (step.nodal(source, data), step.nodal(source, data)))
-    print(
-        f"{len(layout.nodes)} nodes: placing nodes {placed - start:.2f} s, factorising {built - placed:.2f} s, "
-        f"spectral radius ({radius:.4f}) {judged - built:.2f} s, one SDIRK2 step {1e3 * seconds:.1f} ms"
-    )
+    print(f"{len(layout.nodes)} nodes: placed {placed - start:.2f} s, factorised {built - placed:.2f} s")
+    print(f"spectral radius {radius:.4f} in {judged - built:.2f} s, one SDIRK2 step {1e3 * seconds:.1f} ms")
 
 
 if __name__ == "__main__":
