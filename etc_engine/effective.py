@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.box import AXES, Box
 from etc_engine.contacts import ContactNetwork
+from etc_engine.dtem.bounds import energy_bounds
 from etc_engine.dtem.resistance import self_resistance
 from etc_engine.dtem.steady import SteadySolution, solve_steady
 from etc_engine.errors import ConvergenceError
@@ -153,6 +154,46 @@ def effective_conductivity(
             tensor[axis, axis] = solution.energies[0, 0] * box.lengths[axis] / box.cross_section(axis)
         solutions.append(solution)
     return EffectiveConductivity(tensor, tuple(spans), tuple(solutions))
+
+
+def conductivity_bounds(result: EffectiveConductivity) -> NDArray[np.float64]:
+    """Two-sided bounds of the diagonal of the conductivity tensor, by method ``exact``.
+
+    Parameters
+    ----------
+    result : EffectiveConductivity
+        Of method ``exact``.
+
+    Returns
+    -------
+    ndarray, shape (d, 2) [W/(m K)]
+        Lower and upper bound along each axis; NaN where it was not asked for.
+
+    Raises
+    ------
+    InputError
+        If the method is another one.
+
+    Notes
+    -----
+    See `etc_engine.dtem.bounds.energy_bounds` for what is rigorous about them and what is estimated.
+
+    Examples
+    --------
+    >>> from etc_engine.contacts import bonded_contacts
+    >>> from etc_engine.packing.particles import ParticlePacking
+    >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    >>> result = effective_conductivity(bonded_contacts(packing, 0.1), method="exact", axes=(0,))
+    >>> conductivity_bounds(result)[0].round(6)
+    array([0.214853, 0.214853])
+    """
+    bounds = np.full((result.tensor.shape[0], 2), np.nan)
+    for solution in result.solutions:
+        box = solution.network.packing.box
+        for axis, energies in zip(solution.axes, energy_bounds(solution), strict=True):
+            periodic = box.periodic[axis]
+            bounds[axis] = energies * (1.0 / box.volume if periodic else box.lengths[axis] / box.cross_section(axis))
+    return bounds
 
 
 def wall_heat_flows(solution: SteadySolution) -> tuple[float, float]:

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 @click.option("--box", help="Edge lengths, such as 1,1; a dump brings its own.")
 @click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere. A dump brings its own.")
 @click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
-@click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced or arc.")
+@click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced, arc or exact.")
+@click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
 )
@@ -48,6 +49,7 @@ def solve_command(
     periodic: str | None,
     frame: int | None,
     method: str,
+    modes: int | None,
     contact_angle: float | None,
     bond_gap: float,
     conductivity: float | None,
@@ -86,6 +88,7 @@ def solve_command(
         method=method,
         conductivity=given if table.conductivity is None else table.conductivity,
         contact_resistance=contact_resistance,
+        modes=modes,
         axes=(0, 1) if all(table.packing.box.periodic) else (0,),
     )
     field = recover_field(result.solutions[0])
@@ -189,12 +192,17 @@ def _warn_of_close_arcs(method: str, result: EffectiveConductivity) -> None:
 def _record(
     network: ContactNetwork, method: str, result: EffectiveConductivity, field: ParticleField
 ) -> dict[str, Any]:
+    from etc_engine.effective import conductivity_bounds
     from etc_engine.realization import Status
 
     percolates = bool(result.spans[0])
     record: dict[str, Any] = {"method": method, "conductivity": float(result.tensor[0, 0])}
     if all(network.packing.box.periodic):
         record["conductivity_tensor"] = result.tensor
+    if method == "exact":
+        bounds = conductivity_bounds(result)[0]
+        record["conductivity_bounds"] = bounds
+        record["model_error_estimate"] = float(bounds[1] / bounds[0] - 1.0) if percolates else 0.0
     return record | {
         "particles": network.packing.count,
         "contacts": network.count,
@@ -217,6 +225,8 @@ def _print_table(record: dict[str, Any]) -> None:
             continue
         if name == "conductivity_tensor":
             text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
+        elif name == "conductivity_bounds":
+            text = " to ".join(f"{k:.8g}" for k in value)
         else:
             text = f"{value:.8g}" if isinstance(value, float) else str(value)
         unit = " W/(m K)" if name.startswith("conductivity") else ""

@@ -27,6 +27,8 @@ MODES = 3
 """Flux modes of a contact."""
 SMALL_ANGLE = np.radians(7.0)
 """Half-angle up to which the coarsest points serve: the corners of such a lune are nearly smooth."""
+POINTS_OF_MODES = ((3, 20), (4, 28), (6, 44))
+"""Modes that a number of points serves; beyond the last, 52."""
 DIGITS = 12.0
 """Logarithm of the error that the sink at the centre may leave at the points of a chord."""
 
@@ -83,7 +85,7 @@ def exact_elements(sides: ContactSides, material: Material, modes: int = MODES) 
     The Neumann problem of the cut disk is solved to about 1e-8 (see `etc_engine.dtem.cut_disk`), whatever the number
     of modes, in about a millisecond a disk.
     """
-    chords = cut_chords(sides, material)
+    chords = cut_chords(sides, material, modes=modes)
     offsets = modes * sides.offsets
     starts = packed_starts(offsets)
     values = np.zeros(int(starts[-1]))
@@ -95,7 +97,7 @@ def exact_elements(sides: ContactSides, material: Material, modes: int = MODES) 
         modes,
         starts,
         values,
-        chord_points(),
+        chord_points(chords.levels),
     )
     refuse_indefinite(bad, sides)
     nodes = (modes * sides.nodes[:, None] + np.arange(modes)).ravel()
@@ -117,7 +119,7 @@ def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.
     uncut = np.zeros(idle.size, dtype=np.bool_)
     uncut[sides.of_walls] = idle[sides.of_walls]
     cut_rows = sides.of_walls[sides.cuts.walls]
-    chords = cut_chords(sides, material, uncut, cut_rows)
+    chords = cut_chords(sides, material, uncut, cut_rows, modes=flows.shape[1])
     on_arc = np.where(uncut, sides.theta, np.nan)
     on_arc[cut_rows] = np.nan
     return _potentials(
@@ -127,7 +129,7 @@ def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.
         np.ascontiguousarray(flows),
         sides.offsets,
         on_arc,
-        chord_points(),
+        chord_points(chords.levels),
     )
 
 
@@ -136,6 +138,8 @@ def cut_chords(
     material: Material,
     uncut: NDArray[np.bool_] | None = None,
     cut_rows: NDArray[np.int64] | None = None,
+    *,
+    modes: int,
 ) -> Chords:
     """The chords of all contact sides but the ``uncut`` ones, and the insulated cuts with their rows (-1)."""
     cuts = sides.cuts
@@ -149,7 +153,7 @@ def cut_chords(
     exponents = np.concatenate([edge_exponents(sides, material)[kept], np.ones(cuts.particles.size)])[order]
     signs = np.concatenate([sides.mode_signs[kept], np.ones(cuts.particles.size)])[order]
     refuse_overlap(offsets, theta, alpha)
-    levels = _choose_levels(offsets, theta, alpha)
+    levels = _choose_levels(offsets, theta, alpha, modes)
     return Chords(offsets, rows, theta, alpha, exponents, levels, signs)
 
 
@@ -173,15 +177,16 @@ def edge_exponents(sides: ContactSides, material: Material) -> NDArray[np.float6
 
 
 def _choose_levels(
-    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]
+    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64], modes: int
 ) -> NDArray[np.int64]:
-    """The cheapest points that resolve each chord: its neighbours' corners, its own corners, and the sink."""
+    """The cheapest points that resolve each chord: neighbours' corners, its own, the sink, the modes."""
+    enough = min((points for most, points in POINTS_OF_MODES if modes <= most), default=52)
     clearance = _clearances(offsets, theta, alpha)
     levels = np.full(alpha.size, -1, dtype=np.int64)
     for level, (made_for, points) in reversed(list(enumerate(LEVELS))):
         stretch = np.arctanh(1.0 / (1.0 + made_for))
         sink = np.arctan(np.tanh(stretch) / np.tan(alpha)) / stretch
-        fit = (clearance >= made_for) & (points * np.arcsinh(sink) >= DIGITS)
+        fit = (clearance >= made_for) & (points * np.arcsinh(sink) >= DIGITS) & (points >= enough)
         levels[fit & ((alpha <= SMALL_ANGLE) | (made_for <= 0.1))] = level
     bad = np.flatnonzero(levels < 0)
     if bad.size:
@@ -231,7 +236,7 @@ def _fill(
             continue
         every = (chords.offsets[p + 1] - first) * modes
         h = np.empty((every, every))  # the chords of contacts come before those of insulated walls
-        solve_cut_disk(*_of_disk(chords, p), modes, points, h)
+        solve_cut_disk(*of_disk(chords, p), modes, points, h)
         for a in range(contacts):
             for k in range(modes):
                 for b in range(contacts):
@@ -267,7 +272,7 @@ def _potentials(
         if not np.any(coefficients):
             continue
         h = np.empty((count * modes, count * modes))
-        theta, alpha, exponents, levels = _of_disk(chords, p)
+        theta, alpha, exponents, levels = of_disk(chords, p)
         starts, _, strengths = solve_cut_disk(theta, alpha, exponents, levels, modes, points, h)
         means, sources = h @ coefficients, strengths @ coefficients
         for a in range(count):
@@ -281,7 +286,7 @@ def _potentials(
 
 
 @njit(cache=True)
-def _of_disk(
+def of_disk(
     chords: Chords, p: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Position angles, half-angles, exponents and levels of the chords of one disk."""

@@ -18,6 +18,7 @@ Driscoll, Trefethen 2002, Schwarz-Christoffel Mapping, doi:10.1017/CBO9780511546
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -80,8 +81,8 @@ class ChordPoints(NamedTuple):
     waves: NDArray[np.float64]
 
 
-def chord_points() -> ChordPoints:
-    """Tables of all levels."""
+def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
+    """Tables of the levels that are used; those of the others are left empty."""
     levels, widest = len(LEVELS), max(points for _, points in LEVELS)
     waves = np.linspace(0.5, SINK_WAVES - 0.5, SINK_WAVES) * WAVE_STEP
     flat = np.zeros((4, levels, widest))
@@ -90,7 +91,8 @@ def chord_points() -> ChordPoints:
     step = 0.5 * CHI_STEP
     chi = np.arange(-CHI_POINTS, CHI_POINTS + 1) * step
     phases = waves[:, None] * chi
-    for level, (clearance, points) in enumerate(LEVELS):
+    for level in sorted(set(used)):
+        clearance, points = LEVELS[level]
         stretch = np.arctanh(1.0 / (1.0 + clearance))
         xi, w = np.polynomial.legendre.leggauss(points)
         jacobian = stretch / np.cosh(stretch * xi) ** 2 / np.tanh(stretch)
