@@ -67,6 +67,7 @@ def made_sweep():
     from etc_engine.batch.provenance import attributes, this_run
     from etc_engine.batch.records import Record
     from etc_engine.batch.study import parse_study
+    from etc_engine.batch.table import tabulate
     from etc_engine.realization import Cell, Realization, Status
 
     def cell(value, mean_field: float) -> Cell:
@@ -80,7 +81,7 @@ def made_sweep():
     def build(text: str, conduct, solid=lambda density: density, mean_field: float = 0.5):
         study = parse_study(text)
         angles = study.contacts.contact_angle or (None,)
-        records = {}
+        records = []
         for density in study.densities:
             for r in range(study.statistics.realizations):
                 values = tuple(
@@ -88,7 +89,7 @@ def made_sweep():
                 )
                 result = Realization(100, density, solid(density), 0.01, values)
                 unit = Unit(density, r)
-                records[unit] = Record(unit, result, 0, "here", 0.0, 1.0)
-        return assemble(study, records, attributes(study, text, [this_run("made", 1, "")], ["here"]))
+                records.append(Record(unit, result, 0, "here", 0.0, 1.0))
+        return assemble(study, tabulate(study, records), attributes(study, text, [this_run("made", 1, "")], ["here"]))
 
     return build

@@ -69,12 +69,26 @@ class _Form:
     high: tuple[float, ...]
 
 
+@dataclass(frozen=True)
+class _Points:
+    """Solid fraction, conductivity, and its relative standard error or None for points that weigh alike."""
+
+    f: Floats
+    k: Floats
+    error: Floats | None
+
+
+ENOUGH = 5
+"""A standard error of fewer realizations is too uncertain to be a weight."""
+
+
 def fit_models(dataset: xarray.Dataset) -> tuple[Fit, ...]:
     r"""Percolation, Lewis-Nielsen and Agari-Uno constants of a sweep over the density.
 
     .. math:: k = a (f - f_c)^t
 
-    for the percolation law; the others as in `etc_engine.models`. Least squares of log k, all points alike.
+    for the percolation law; the others as in `etc_engine.models`. Least squares of log k, each point weighted by its
+    relative standard error if all have `ENOUGH` realizations for one, else all points alike.
 
     Parameters
     ----------
@@ -104,14 +118,18 @@ def fit_models(dataset: xarray.Dataset) -> tuple[Fit, ...]:
         cell = simulation.sel(selection)
         fraction, k = cell["solid_fraction"].values, cell["conductivity_mean"].values
         used = np.isfinite(fraction) & (np.nan_to_num(k) > 0.0)
-        fits += _fit_all(fraction[used], k[used], medium, selection, confidence)
+        error = cell["conductivity_sem"].values[used] / k[used]
+        weighted = (cell["count"].values[used] >= ENOUGH) & (np.nan_to_num(error) > 1e-9)
+        points = _Points(fraction[used], k[used], error if weighted.all() else None)
+        fits += _fit_all(points, medium, selection, confidence)
     return tuple(fits)
 
 
-def _fit_all(f: Floats, k: Floats, medium: Phases, selection: dict[str, Any], confidence: float) -> list[Fit]:
+def _fit_all(points: _Points, medium: Phases, selection: dict[str, Any], confidence: float) -> list[Fit]:
+    f = points.f
     if f.size < 3 or np.ptp(f) <= 0.0:
         return [Fit("percolation_power_law", selection, f.size, note="needs conductivities at 4 densities or more")]
-    fits = [_fit(_percolation(f, k), f, k, selection, confidence)]
+    fits = [_fit(_percolation(f, points.k), points, selection, confidence)]
     if medium.pores <= 0.0:
         note = "needs pores that conduct"
         return [
@@ -119,11 +137,11 @@ def _fit_all(f: Floats, k: Floats, medium: Phases, selection: dict[str, Any], co
             Fit("lewis_nielsen", selection, f.size, note=note),
             Fit("agari_uno", selection, f.size, note=note),
         ]
-    fits.append(_fit(_lewis_nielsen(f, medium), f, k, selection, confidence))
+    fits.append(_fit(_lewis_nielsen(f, medium), points, selection, confidence))
     if abs(np.log(medium.particles)) < 1e-6:
         note = "C2 has no effect where the particles have 1 W/(m K), the unit of the formula"
         return [*fits, Fit("agari_uno", selection, f.size, note=note)]
-    return [*fits, _fit(_agari_uno(medium), f, k, selection, confidence)]
+    return [*fits, _fit(_agari_uno(medium), points, selection, confidence)]
 
 
 def _percolation(f: Floats, k: Floats) -> _Form:
@@ -166,10 +184,11 @@ def _agari_uno(medium: Phases) -> _Form:
     return _Form("agari_uno", ("matrix_factor", "chain_factor"), curve, (1.0, 1.0), (1e-6, -50.0), (1e6, 50.0))
 
 
-def _fit(form: _Form, f: Floats, k: Floats, selection: dict[str, Any], confidence: float) -> Fit:
+def _fit(form: _Form, points: _Points, selection: dict[str, Any], confidence: float) -> Fit:
     """Least squares of log k; the interval of every constant from the covariance of the linearized problem."""
     from scipy.optimize import OptimizeWarning, curve_fit
 
+    f, k = points.f, points.k
     spare = f.size - len(form.names)
     if spare < 1:
         return Fit(
@@ -181,7 +200,14 @@ def _fit(form: _Form, f: Floats, k: Floats, selection: dict[str, Any], confidenc
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", OptimizeWarning)  # an infinite covariance says the same
             values, covariance = curve_fit(
-                form.curve, f, np.log(k), p0=form.start, bounds=(form.low, form.high), x_scale="jac", max_nfev=5000
+                form.curve,
+                f,
+                np.log(k),
+                p0=form.start,
+                sigma=points.error,
+                bounds=(form.low, form.high),
+                x_scale="jac",
+                max_nfev=5000,
             )
     except (RuntimeError, ValueError) as error:
         return Fit(form.model, selection, f.size, note=f"no least-squares fit: {error}")

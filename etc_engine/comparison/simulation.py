@@ -62,17 +62,24 @@ def study_of(dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def phases(dataset: xarray.Dataset) -> Phases:
-    """The phases of the medium a sweep simulates, from the study stored with it."""
+    """The phases of the medium a sweep simulates, from the study stored with it.
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the result of a sweep, or its particles are of two materials.
+    """
     study = study_of(dataset)
-    particles = study["conduction"]["conductivity"]
-    if not isinstance(particles, float | int):
+    conduction = study["conduction"]
+    mixture = conduction.get("mixture")
+    if mixture is not None and mixture["conductivity"] != conduction["conductivity"]:
         raise InputError(
-            f"models of two phases need particles of one conductivity, this study has {particles}: "
-            "compare a mixture in the analysis of its study"
+            f"models of two phases need particles of one material, this study mixes {conduction['conductivity']:g} and "
+            f"{mixture['conductivity']:g} W/(m K): compare it as studies/mixture does"
         )
     return Phases(
         pores=float(study["models"]["pore_conductivity"]),
-        particles=float(particles),
+        particles=float(conduction["conductivity"]),
         dimension=dataset.sizes["direction_i"],
         overlapping=study["contacts"]["rule"] == "overlap",
     )

@@ -172,6 +172,11 @@ def test_refusals(made_sweep):
         evaluate_models(dataset, {"lewis_nielsen": {"shape": 1.0}})
     with pytest.raises(InputError, match="not the result of a sweep: it has no status"):
         evaluate_models(dataset.drop_vars("status"))
+    mixed = OVERLAP.replace(
+        "conductivity = 2.0", "conductivity = 2.0\nmixture = { conductivity = 9.0, fraction = 0.5 }"
+    )
+    with pytest.raises(InputError, match=r"this study mixes 2 and 9 W/\(m K\)"):
+        evaluate_models(made_sweep(mixed, noisy))
     with pytest.raises(InputError, match="no attribute study_resolved"):
         phases(xarray.Dataset())
 
@@ -221,6 +226,24 @@ def test_the_interval_of_a_constant_covers_the_truth_as_often_as_it_says(made_sw
         found, _ = constants(fit_models(made_sweep(text, lambda f, *_, k=k: k[f])), "agari_uno")
         hits += found["chain_factor"].low <= 0.8 <= found["chain_factor"].high
     assert 81 <= hits <= 99
+
+
+def test_points_weigh_by_their_standard_error(made_sweep):
+    """One density of ten times the scatter: the weighted fit of log k = a + b f, by numpy's polyfit."""
+    text = CONDUCTING_PORES.replace("realizations = 4", "realizations = 8")
+
+    def scattered(density, angle, method, realization):
+        rng = np.random.default_rng([20268, int(1000 * density), realization])
+        return agari_uno(0.2, 2.0, density, 1.1, 0.8) * (1.0 + (0.1 if density == 0.7 else 0.01) * rng.normal())
+
+    dataset = made_sweep(text, scattered)
+    statistics = simulated(dataset)
+    f, k = statistics["density"].values, statistics["conductivity_mean"].values
+    # log k = f C2 log k2 + (1 - f) log(C1 k1) is a line in f: its values at f = 0 and 1 give the constants
+    slope, start = np.polyfit(f, np.log(k), 1, w=k / statistics["conductivity_sem"].values)
+    found, _ = constants(fit_models(dataset), "agari_uno")
+    assert found["matrix_factor"].value == pytest.approx(np.exp(start) / 0.2, rel=1e-6)
+    assert found["chain_factor"].value == pytest.approx((slope + start) / np.log(2.0), rel=1e-6)
 
 
 def test_why_there_is_no_fit(made_sweep):

@@ -1,0 +1,91 @@
+"""Disks of two materials over their number fraction: ``python analyse.py figure.png mixture_*.nc``
+
+A contact of materials i and j conducts in series, g_ij = 2 k_i k_j/(k_i + k_j) in units of a contact of material 1 with
+itself. Effective medium for networks of coordination number z (S. Kirkpatrick, Rev. Mod. Phys. 45, 574, 1973), with
+the contacts taken for independent: sum_b p_b (g_b - g)/(g_b + (z/2 - 1) g) = 0.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from scipy.optimize import brentq
+
+
+def effective_medium(x: float, k1: float, k2: float, z: float) -> float:
+    """Conductivity of the mixture over that of material 1 alone."""
+    parts = np.array([(1.0 - x) ** 2, 2.0 * x * (1.0 - x), x**2])
+    bonds = np.array([k1, 2.0 * k1 * k2 / (k1 + k2), k2])
+    low, high = 0.5 * bonds.min(), 2.0 * bonds.max()
+    return brentq(lambda g: float(np.sum(parts * (bonds - g) / (bonds + (0.5 * z - 1.0) * g))), low, high) / k1
+
+
+def main(picture: str, *results: str) -> None:
+    columns, fractions = [], []
+    for path in results:
+        data = xr.open_dataset(path).isel(density=0, drop=True)
+        conduction = json.loads(data.attrs["study_resolved"])["conduction"]
+        k1, k2 = conduction["conductivity"], conduction["mixture"]["conductivity"]
+        fractions.append(conduction["mixture"]["fraction"])
+        columns.append(data[["conductivity", "coordination"]])
+    whole = xr.concat(columns, dim=xr.DataArray(fractions, dims="fraction", name="fraction")).sortby("fraction")
+    k = whole["conductivity"]
+    k = 0.5 * (k.sel(direction_i="x", direction_j="x") + k.sel(direction_i="y", direction_j="y"))
+    if not (whole["fraction"] == 0.0).any():
+        raise SystemExit("one result has to be of fraction = 0.0, the packings of material 1 alone")
+    # The packings are the same for all fractions: relative to the pure one, their scatter drops out.
+    relative = k / k.sel(fraction=0.0)
+    mean = relative.mean("realization")
+    error = relative.std("realization", ddof=1) / np.sqrt(relative.sizes["realization"])
+    z = float(whole["coordination"].mean())
+    x = whole["fraction"].values
+    medium = np.array([effective_medium(value, k1, k2, z) for value in x])
+
+    angles = whole["contact_angle"].values
+    print(f"z = {z:.3f}; conductivity over that of material 1 alone")
+    print(f"{'fraction':>9s}" + "".join(f"{f'{a:g} degrees':>22s}" for a in angles) + f"{'effective medium':>18s}")
+    for i, value in enumerate(x):
+        cells = [
+            (float(mean.isel(fraction=i).sel(contact_angle=a)), float(error.isel(fraction=i).sel(contact_angle=a)))
+            for a in angles
+        ]
+        print(f"{value:9.2f}" + "".join(f"{m:12.4f} +- {e:.4f}" for m, e in cells) + f"{medium[i]:18.4f}")
+    for angle in angles:
+        off = 100.0 * (mean.sel(contact_angle=angle) / medium - 1.0)
+        print(f"{angle:g} degrees: {float(off.min()):+.1f} % to {float(off.max()):+.1f} % off the effective medium")
+
+    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+    axes = figure.subplots()
+    fine = np.linspace(0.0, 1.0, 101)
+    for i, angle in enumerate(angles):
+        axes.errorbar(
+            x,
+            mean.sel(contact_angle=angle),
+            error.sel(contact_angle=angle),
+            fmt="os^D"[i % 4],
+            markersize=4,
+            capsize=2,
+            label=f"simulation, {angle:g}°",
+        )
+    axes.plot(
+        fine,
+        [effective_medium(value, k1, k2, z) for value in fine],
+        "k-",
+        linewidth=0.9,
+        label=f"effective medium of a network, z = {z:.2f}",
+    )
+    axes.plot(fine, (k2 / k1) ** fine, "k:", linewidth=0.9, label="geometric mean")
+    axes.set_yscale("log")
+    axes.set_xlabel("number fraction of the better conductor [-]")
+    axes.set_ylabel("conductivity over that of material 1 alone [-]")
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+    figure.savefig(picture, dpi=130)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
