@@ -5,7 +5,7 @@ from etc_engine.packing.density import set_density
 from etc_engine.packing.neighbors import NeighborPairs, neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.radii import RadiusDistribution, parse_radii
-from etc_engine.packing.structure import solid_fraction, union_area
+from etc_engine.packing.structure import solid_fraction, union_area, union_volume
 
 __all__ = [
     "METHODS",
@@ -19,4 +19,5 @@ __all__ = [
     "set_density",
     "solid_fraction",
     "union_area",
+    "union_volume",
 ]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError, PackingError
-from etc_engine.packing.hard_spheres import DONE, EXCURSION, Gas, make_gas, run, start_lists
+from etc_engine.packing.hard_spheres import DONE, EXCURSION, FULL, Gas, make_gas, run, start_lists
 from etc_engine.packing.overlap import check_no_overlap
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.random_sequential import insert_in_turn
@@ -34,7 +35,7 @@ SLOWEST = 0.2
 """... down to this part of the growth rate: particles then find enough contacts to hold each other."""
 
 BATCH = 8
-"""Collisions per particle (twice the number of pairs hit) between two synchronisations."""
+"""Collisions that each particle takes part in, on average, between two synchronisations."""
 
 BUDGET = 100_000
 """Collisions per particle after which a compression is given up."""
@@ -134,48 +135,75 @@ def compress(
     0.7
     """
     radii = np.asarray(radii, dtype=np.float64)
-    d, count = box.dimension, radii.size
-    unit = _unit_scale(radii, box)
+    d, unit = box.dimension, _unit_scale(radii, box)
     goal = _refuse_the_impossible(radii, box, density)
     if growth_rate is not None and not (np.isfinite(growth_rate) and growth_rate > 0.0):
         raise InputError(f"a growth rate must be positive and finite, found {growth_rate}")
     fastest = (GROWTH_RATE[d] if growth_rate is None else growth_rate) / (2.0 * radii.mean())
-    target = unit * goal ** (1.0 / d)
     start, centers = _random_start(radii, box, min(START_DENSITY[d], 0.9 * goal), rng)
-    scale = unit * start ** (1.0 / d)
     order = _spatial_order(centers, box)
-    excursion = _excursion(radii * target, box)
-    room = 24 if d == 2 else 60
-    gas = make_gas(centers[order], rng.standard_normal((count, d)), radii[order], box, target, excursion, room)
-    pressure, collisions, renewals = 1.0, 0, 0
-    while True:
+    velocities = rng.standard_normal(centers.shape)
+
+    def notify(scale: float, pressure: float) -> None:
+        if progress is not None:
+            reached = ((scale / unit) ** d - start) / (goal - start)
+            part = reached if density is not None else np.log(pressure) / np.log(jammed)
+            progress(float(np.clip(part, 0.0, 1.0)))
+
+    first, last = unit * start ** (1.0 / d), unit * goal ** (1.0 / d)
+    grown = _grow(centers[order], velocities, radii[order], box, first, last, fastest, jammed, notify)
+    centers[order] = grown.centers
+    packing = ParticlePacking(_inside(centers, box), radii * grown.scale, box)
+    check_no_overlap(packing)
+    _refuse_to_stop_short(packing, None if grown.arrived else density, grown.pressure, jammed)
+    return Compression(packing, grown.pressure, grown.collisions, grown.renewals)
+
+
+class _Grown(NamedTuple):
+    """Where growth ended."""
+
+    centers: NDArray[np.float64]
+    scale: float
+    pressure: float
+    collisions: int
+    renewals: int
+    arrived: bool
+
+
+def _grow(
+    centers: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    shapes: NDArray[np.float64],
+    box: Box,
+    scale: float,
+    target: float,
+    fastest: float,
+    jammed: float,
+    notify: Callable[[float, float], None],
+) -> _Grown:
+    """Grow radii ``shapes * scale`` until the scale is `target`, the packing jams or the budget is used up."""
+    count, d = centers.shape
+    excursion, room = _excursion(shapes * target, box), 24 if d == 2 else 60
+    gas = make_gas(centers, velocities, shapes, box, target, excursion, room)
+    pressure, collisions, renewals, arrived = 1.0, 0, 0, False
+    batch = BATCH * count // 2 + 1
+    while not arrived and pressure < jammed and 2 * collisions <= BUDGET * count:
         rate = fastest * max(SLOWEST, min(1.0, STIFF / pressure))
         energy = _cool(gas, box)
-        if not start_lists(gas, scale, rate, excursion):
-            room, gas = 2 * room, _with_room(gas, box, target, excursion, 2 * room)
-            continue
-        why, time, hits, renewed, virial = run(
-            gas, scale, rate, excursion, (target - scale) / rate, BATCH * count // 2 + 1
-        )
-        collisions, renewals = collisions + hits, renewals + renewed
-        if hits and why == DONE:
-            pressure = 1.0 + virial / (time * 0.5 * (energy + np.sum(gas.state[:, 3:6] ** 2)))
-        arrived = why == DONE and hits <= BATCH * count // 2
-        scale = target if arrived else scale + rate * time
-        if why != DONE:
-            room, gas = 2 * room, _with_room(gas, box, target, excursion, 2 * room)
-        if progress is not None:
-            reached = (scale / unit) ** d
-            part = (reached - start) / (goal - start) if density else np.log(pressure) / np.log(jammed)
-            progress(float(np.clip(part, 0.0, 1.0)))
-        if arrived or pressure >= jammed or 2 * collisions > BUDGET * count:
-            break
-    placed = np.empty((count, d))
-    placed[order] = gas.state[:, :d]
-    packing = ParticlePacking(_inside(placed, box), radii * scale, box)
-    check_no_overlap(packing)
-    _refuse_to_stop_short(packing, density if not arrived else None, pressure, jammed)
-    return Compression(packing, float(pressure), collisions, renewals)
+        why = FULL
+        if start_lists(gas, scale, rate, excursion):
+            why, time, hits, renewed, virial = run(gas, scale, rate, excursion, (target - scale) / rate, batch)
+            collisions, renewals, scale = collisions + hits, renewals + renewed, scale + rate * time
+            if why == DONE and hits:
+                pressure = 1.0 + virial / (time * 0.5 * (energy + np.sum(gas.state[:, 3:6] ** 2)))
+            arrived = why == DONE and hits < batch
+            scale = target if arrived else scale
+        if why == FULL:
+            room *= 2
+            state = gas.state
+            gas = make_gas(state[:, :d], state[:, 3 : 3 + d], shapes, box, target, excursion, room)
+        notify(scale, pressure)
+    return _Grown(gas.state[:, :d], scale, float(pressure), int(collisions), int(renewals), arrived)
 
 
 def _unit_scale(radii: NDArray[np.float64], box: Box) -> float:
@@ -262,13 +290,6 @@ def _cool(gas: Gas, box: Box) -> float:
     gas.state[:, :d] = box.wrap(gas.state[:, :d])
     gas.state[:, 6] = 0.0
     return float(np.sum(velocities**2))
-
-
-def _with_room(gas: Gas, box: Box, target: float, excursion: float, room: int) -> Gas:
-    """The same particles with longer neighbour lists."""
-    d = box.dimension
-    state = gas.state
-    return make_gas(state[:, :d], state[:, 3 : 3 + d], state[:, 7], box, target, excursion, room)
 
 
 def _inside(centers: NDArray[np.float64], box: Box) -> NDArray[np.float64]:

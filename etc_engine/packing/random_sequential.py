@@ -177,7 +177,7 @@ def _try_what_is_left(
 ) -> bool:
     """Trials in the voxels that are not covered; False when none is left, so that the box is saturated."""
     d, radius = box.dimension, float(state.sizes[0])
-    cells = np.ceil(np.asarray(box.lengths) / (0.5 * radius)).astype(np.int64)
+    cells = np.ceil(np.asarray(box.lengths) / radius).astype(np.int64)
     width = np.zeros(3)
     width[:d] = np.asarray(box.lengths) / cells
     corners = np.zeros((int(cells.prod()), 3))
@@ -192,7 +192,9 @@ def _try_what_is_left(
         if len(corners) * len(halves) > MOST_VOXELS:
             raise PackingError(
                 f"saturation could not be decided within {MOST_VOXELS} voxels: use fewer particles at a time",
-                reached=state.placed * np.pi * radius**2 / box.volume,
+                reached=float(
+                    state.placed * (np.pi * radius**2 if d == 2 else 4.0 / 3.0 * np.pi * radius**3) / box.volume
+                ),
             )
         picked = rng.integers(0, len(corners), 4 * len(corners))
         points = corners[picked] + rng.random((len(picked), 3)) * width
