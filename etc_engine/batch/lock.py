@@ -3,7 +3,8 @@
 The lock is a small file with the holder's host, process and batch job, touched every few seconds. It is
 stale when its process is gone (same host), when its batch job was requeued and this is the requeued job,
 or when it has not been touched for `SILENCE` seconds (another host). Times are compared on the clock of
-the file system, so clocks of hosts may differ.
+the file system, so clocks of hosts may differ. A small shell does the touching: a compiled kernel can keep
+a thread of this process waiting for minutes.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import json
 import os
 import socket
-import threading
+import subprocess
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -22,6 +23,8 @@ from etc_engine.errors import OutputError
 
 BEAT = 10.0
 SILENCE = 120.0
+HEART = 'while kill -0 "$3" && grep -q "$2" "$1"; do touch -c "$1"; sleep "$4"; done 2>/dev/null'
+"""Touches a lock as long as the process lives and the lock is its run's: path, run, process, seconds."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,7 @@ class Lock:
     def __init__(self, folder: Path, run: str) -> None:
         self.path = folder / "lock"
         self.holder = Holder.this_process(run)
-        self._ended = threading.Event()
-        self._heart = threading.Thread(target=self._beat, name="lock", daemon=True)
+        self._heart: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Lock:
         while not self._create(self.path):
@@ -79,15 +81,17 @@ class Lock:
             if reason:
                 raise OutputError(f"another run is computing this output ({reason}): wait for it, or end it first")
             self._remove_stale()
-        self._heart.start()
+        command = ["sh", "-c", HEART, "heart", str(self.path), self.holder.run, str(os.getpid()), str(BEAT)]
+        quiet = subprocess.DEVNULL  # an open pipe would keep the launcher waiting
+        self._heart = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._ended.set()
-        if self._heart.is_alive():
-            self._heart.join()
+        if self._heart is not None:
+            self._heart.terminate()
+            self._heart.wait()
         if held_by(self.path, self.holder.run):
             self.path.unlink(missing_ok=True)
 
@@ -122,13 +126,6 @@ class Lock:
                 self.path.unlink(missing_ok=True)
         finally:
             bolt.unlink(missing_ok=True)
-
-    def _beat(self) -> None:
-        while not self._ended.wait(BEAT):
-            try:
-                os.utime(self.path)
-            except OSError:
-                return  # taken over or removed: the next check of held_by tells
 
 
 def held_by(path: Path, run: str) -> bool:

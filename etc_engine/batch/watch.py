@@ -10,14 +10,14 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
-from etc_engine.batch.lock import SILENCE, held_by, seconds_since_touched
-from etc_engine.errors import OutputError
+from etc_engine.batch.lock import SILENCE, held_by
 
-LOOK = 15.0
+LOOK = 30.0
 RESUMABLE = 75
 
 
@@ -40,6 +40,7 @@ class Watch:
         self._lock, self._run = lock, run
         self._parent = os.getppid() if launched else None
         self._leave = leave or _leave
+        self._touched, self._since = 0, time.monotonic()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._look, name="watch", daemon=True)
 
@@ -49,11 +50,14 @@ class Watch:
             return "the launcher is gone"
         if not held_by(self._lock, self._run):
             return f"another run has taken over {self._lock}"
-        try:
-            silent = seconds_since_touched(self._lock)
-        except OutputError:
-            return ""  # a full disk is for the shard to tell
-        return f"rank 0 has been silent for {silent:.0f} s" if silent and silent > SILENCE else ""
+        return f"rank 0 has been silent for {self._silence():.0f} s" if self._silence() > SILENCE else ""
+
+    def _silence(self) -> float:
+        """Seconds since the lock was last seen to change; no clock but this host's takes part."""
+        now, touched = time.monotonic(), self._lock.stat().st_mtime_ns if self._lock.exists() else 0
+        if touched != self._touched:
+            self._touched, self._since = touched, now
+        return now - self._since
 
     def _look(self) -> None:
         while not self._ended.wait(LOOK):

@@ -218,7 +218,7 @@ def test_another_study_is_not_mixed_in(stand_in, study, tmp_path):
 
 def test_a_second_process_on_the_same_output_is_refused(stand_in, study, tmp_path):
     output, log = tmp_path / "out.nc", tmp_path / "log"
-    running = subprocess.Popen(command(study, "-o", output, "--seconds", 0.5, "--log", log))
+    running = subprocess.Popen(command(study, "-o", output, "--seconds", 0.3, "--log", log))
     try:
         wait_for_lines(log, 1)
         for policy in ("fresh", "resume", "overwrite"):

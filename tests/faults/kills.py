@@ -166,7 +166,8 @@ class _Sweep:
         self.known = now
 
     def begin_anew(self) -> None:
-        """Forget the finished sweep, keep its file as the last one."""
+        """Forget the finished sweep, and shards it had no time to remove; keep its file as the last one."""
+        shutil.rmtree(shard_folder(self.output), ignore_errors=True)
         self.output.replace(self.folder / "last.nc")
         self.log.unlink(missing_ok=True)
         self.known = {}

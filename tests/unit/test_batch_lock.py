@@ -83,16 +83,32 @@ def test_a_lock_that_cannot_be_read_is_stale_only_when_old(tmp_path):
         assert held_by(path, "next")
 
 
-def test_the_holder_shows_signs_of_life(tmp_path, monkeypatch):
+def test_the_holder_shows_signs_of_life_while_python_is_busy(tmp_path, monkeypatch):
+    """sum over a range holds the interpreter, as a compiled kernel does: no thread of this process can run."""
     monkeypatch.setattr(lock, "BEAT", 0.02)
     with Lock(tmp_path, "first"):
         path = tmp_path / "lock"
-        os.utime(path, (1.0, 1.0))
-        for _ in range(200):
-            if path.stat().st_mtime > 1.0:
+        touched = 0
+        for _ in range(100):
+            os.utime(path, (1.0, 1.0))
+            sum(range(3_000_000))
+            touched += path.stat().st_mtime > 1.0
+            if touched > 2:
                 break
-            threading.Event().wait(0.02)
-        assert path.stat().st_mtime > 1.0
+        assert touched > 2
+
+
+def test_nothing_touches_a_lock_whose_process_was_killed(tmp_path):
+    code = (
+        "import os, pathlib, sys\nfrom etc_engine.batch import lock\nlock.BEAT = 0.02\n"
+        "lock.Lock(pathlib.Path(sys.argv[1]), 'killed').__enter__()\nos.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)
+    path = tmp_path / "lock"
+    threading.Event().wait(0.5)  # for the shell to notice
+    os.utime(path, (1.0, 1.0))
+    threading.Event().wait(0.5)
+    assert path.stat().st_mtime == 1.0
 
 
 def test_of_many_that_find_a_stale_lock_one_gets_it(tmp_path):
