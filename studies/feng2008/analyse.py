@@ -1,6 +1,6 @@
 """Rebuild the examples of Feng, Han, Li, Owen 2008: tables 3 and 4 with every method, and both temperature pictures.
 
-``python studies/feng2008/analyse.py [--output DIRECTORY]`` writes table3.csv, table4.csv, example1.png, example2.png and
+``python studies/feng2008/analyse.py [--output DIRECTORY]`` writes table3.csv, table4.csv, example1.png, example2.png,
 errors.png. Reads the published values from tests/published/data.
 """
 

@@ -1,6 +1,6 @@
 """How large a packing represents the medium: conductivity over system size, periodic against walled.
 
-``python studies/rve_size/analyse.py [--largest 2048] [--output DIRECTORY]`` runs the study at growing numbers of disks with
+``python studies/rve_size/analyse.py [--largest 2048] [--output DIRECTORY]`` runs the study at growing sizes with
 both boundaries, writes rve_size.nc, table.csv and figure.png, and fits
 
     k_walls(N) = k_inf (1 - c N^(-1/2)),      Var[k](N) / k_inf^2 = a / N
