@@ -68,11 +68,11 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
     Returns
     -------
     matplotlib.figure.Figure
-        One panel a method; against the contact angle if the sweep has one density and several angles.
+        One panel a method; if the sweep has one density and several angles, one panel against the angle.
     """
     axis = _axis(comparison)
     panels = _panels(comparison, axis)
-    columns = min(len(panels), 3)
+    columns = 2 if len(panels) == 4 else min(len(panels), 3)
     rows = -(-len(panels) // columns)
     figure = new_figure(2.2 + 4.6 * columns, 0.8 + 4.0 * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
@@ -81,14 +81,19 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
         style(axes)
         if logarithmic:
             axes.set_yscale("log")
+        if axis.dim == "contact_angle" and _is_wide(part[axis.dim].values):
+            axes.set_xscale("log")
         _draw_simulation(axes, part, axis)
         _draw_models(axes, part, lines, axis)
         axes.set_title(title, fontsize=9)
         axes.set_xlabel(axis.label, fontsize=9)
     if not logarithmic:
         grid[0, 0].set_ylim(bottom=0.0)
-    for axes in list(grid.flat)[len(panels) :]:
-        axes.set_visible(False)
+    for i, axes in enumerate(grid.flat):
+        axes.set_visible(i < len(panels))
+        axes.tick_params(labelbottom=i + columns >= len(panels))
+        if i + columns < len(panels):
+            axes.set_xlabel("")
     for axes in grid[:, 0]:
         axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
     for row in range(rows):
@@ -102,7 +107,7 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
 def _axis(comparison: xarray.Dataset) -> _Axis:
     angles = comparison.sizes.get("contact_angle", 1)
     if comparison.sizes["density"] == 1 and angles > 1:
-        return _Axis("contact_angle", "contact half-angle [degree]", None)
+        return _Axis("contact_angle", "contact half-angle [degree]", "method" if "method" in comparison.dims else None)
     return _Axis(
         "density",
         "density (particle area over box area) [-]",
@@ -114,7 +119,7 @@ def _panels(comparison: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.D
     """A title and a part of the comparison for each panel; no dimension is left but the axis and the curves."""
     if axis.dim == "contact_angle":
         comparison = comparison.isel(density=0)
-    if "method" not in comparison.dims:
+    if "method" not in comparison.dims or axis.curves == "method":
         return [("", comparison)]
     return [(f"method {name}", comparison.sel({"method": name})) for name in comparison["method"].values]
 
@@ -127,7 +132,8 @@ def _is_wide(values: NDArray[np.float64]) -> bool:
 def _curves(part: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
     if axis.curves is None:
         return [("simulation", part)]
-    return [(f"{angle:g}°", part.sel({axis.curves: angle})) for angle in part[axis.curves].values]
+    values = part[axis.curves].values
+    return [(v if axis.curves == "method" else f"{v:g}°", part.sel({axis.curves: v})) for v in values]
 
 
 def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
@@ -144,7 +150,8 @@ def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
         axes.plot(x, mean, marker=marker, color=colour, markersize=4.5, linewidth=1.6, zorder=3)
         if MEAN_FIELD in curve["model"].values:
             field = curve["model_conductivity"].sel({"model": MEAN_FIELD}).values
-            axes.plot(x, field, linestyle=(0, (4, 2)), color=colour, linewidth=0.9, zorder=2)
+            shade = GREY if axis.curves == "method" else colour  # it is the same for all methods
+            axes.plot(x, field, linestyle=(0, (4, 2)), color=shade, linewidth=0.9, zorder=2)
 
 
 def _drawn(part: xarray.Dataset) -> list[str]:
@@ -160,6 +167,7 @@ def _lines(
     """Name, abscissas and ordinates of every model line."""
     source = lines if axis.dim == "density" else part
     x, values = source[axis.dim].values, source["model_conductivity"]
+    values = values.isel({dim: 0 for dim in values.dims if dim not in ("model", axis.dim)})  # a formula of the density
     return [(name, x, np.broadcast_to(values.sel({"model": name}).values, x.shape)) for name in _drawn(part)]
 
 
@@ -206,7 +214,7 @@ def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
         handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.6, label=label))
     if MEAN_FIELD in part["model"].values:
         handles.append(Line2D([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=0.9, label="contact mean field"))
-    title = "contact half-angle" if axis.curves else None
+    title = "contact half-angle" if axis.curves == "contact_angle" else None
     columns = min(len(handles), 6)
     figure.legend(
         handles=handles,
