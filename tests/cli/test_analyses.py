@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from etc_engine.batch.dataset import write_dataset
 
 STUDIES = Path(__file__).parents[2] / "studies"
 # for each study: the text that makes it small, and words that its analysis prints
@@ -84,3 +87,14 @@ def test_the_mixture_is_read_over_its_fractions(tmp_path, etc_engine):
 def test_analyses_import_nothing_of_the_engine():
     for name in (*SMALL, "mixture"):
         assert "etc_engine" not in (STUDIES / name / "analyse.py").read_text()
+
+
+def test_the_tutorial_draws_a_figure(made_sweep, tmp_path):
+    text = re.sub(r"density = \[.*?\]", "density = [0.6, 0.7]", (STUDIES / "density_angle" / "study.toml").read_text())
+    write_dataset(made_sweep(text, lambda f, a, _, r: (f - 0.5) * (a + r)), tmp_path / "out.nc")
+    block = re.search(r"<!-- own figure -->\n```python\n(.*?)```", (STUDIES / "README.md").read_text(), re.S)
+    line = [sys.executable, "-W", "error", "-c", block[1]]
+    environment = {**os.environ, "MPLBACKEND": "Agg"}
+    done = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "own.png").stat().st_size > 10_000
