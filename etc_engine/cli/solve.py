@@ -192,6 +192,7 @@ def _warn_of_close_arcs(method: str, result: EffectiveConductivity) -> None:
 def _record(
     network: ContactNetwork, method: str, result: EffectiveConductivity, field: ParticleField
 ) -> dict[str, Any]:
+    from etc_engine.dtem.model_error import chord_error_estimate
     from etc_engine.effective import conductivity_bounds
     from etc_engine.realization import Status
 
@@ -203,6 +204,8 @@ def _record(
         bounds = conductivity_bounds(result)[0]
         record["conductivity_bounds"] = bounds
         record["model_error_estimate"] = float(bounds[1] / bounds[0] - 1.0) if percolates else 0.0
+    if method == "chord":
+        record["model_error_estimate"] = chord_error_estimate(result.solutions[0])
     return record | {
         "particles": network.packing.count,
         "contacts": network.count,
