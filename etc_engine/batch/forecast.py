@@ -79,7 +79,7 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
         finished=sum(tuple(unit) in done for unit in units.tolist()),
         state=state,
         ranks=ranks,
-        first_seconds=first - costly,
+        first_seconds=max(0.0, first - costly),
         unit_seconds=(costly, cheap),
         rank_bytes=_peak_bytes(),
         shard_bytes=len(encode(record)) * len(units),
