@@ -92,6 +92,71 @@ def refuse_indefinite(particle: int, sides: ContactSides) -> None:
         )
 
 
+def smallest_ratio(elements: Elements, reference: Elements) -> float:
+    """A c > 0 with K_e >= c K_e0 for every element, not far below the largest one.
+
+    Parameters
+    ----------
+    elements, reference : Elements
+        K_e and K_e0, of the same sides.
+
+    Notes
+    -----
+    1/c is the largest over the elements of m + s sqrt(n - 1), which bounds the n eigenvalues of K_e^-1 K_e0 (one
+    node grounded) by their mean m and standard deviation s, both from traces.
+
+    References
+    ----------
+    Wolkowicz, Styan 1980, Bounds for eigenvalues using traces, Theorem 2.1, doi:10.1016/0024-3795(80)90258-X.
+    """
+    widest = int(np.diff(elements.offsets).max(initial=1))
+    return 1.0 / _largest_ratio(
+        elements.offsets, elements.starts, reference.values, elements.values, elements.modes, widest
+    )
+
+
+@njit(cache=True)
+def _largest_ratio(
+    offsets: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    upper: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    modes: int,
+    widest: int,
+) -> float:
+    """Bound of the eigenvalues of lower^-1 upper over all elements; infinite if one cannot be inverted."""
+    inverse, product = np.empty((widest, widest)), np.empty((widest, widest))
+    largest = 1e-300
+    for p in range(offsets.size - 1):
+        size = offsets[p + 1] - offsets[p]
+        m, ground = size - 1, size - modes
+        if m < 1 or not np.any(lower[starts[p] : starts[p + 1]]):
+            continue
+        for i in range(m):
+            row = i + (i >= ground)
+            for j in range(i + 1):
+                inverse[i, j] = lower[starts[p] + row * size + j + (j >= ground)]
+        if not _cholesky_inverse(inverse, m):
+            return np.inf
+        trace = 0.0
+        for i in range(m):
+            for j in range(m):
+                column = j + (j >= ground)
+                value = 0.0
+                for k in range(m):
+                    value += inverse[i, k] * upper[starts[p] + (k + (k >= ground)) * size + column]
+                product[i, j] = value
+            trace += product[i, i]
+        squares = 0.0
+        for i in range(m):
+            for j in range(m):
+                squares += product[i, j] * product[j, i]
+        mean = trace / m
+        spread = np.sqrt(max(squares / m - mean * mean, 0.0))
+        largest = max(largest, mean + spread * np.sqrt(m - 1.0))
+    return largest
+
+
 @njit(cache=True)
 def condense(
     h: NDArray[np.float64], size: int, modes: int, work: NDArray[np.float64], out: NDArray[np.float64]

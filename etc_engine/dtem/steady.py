@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.assembly import LinearSystem, assemble, count_positive_off_diagonals
-from etc_engine.dtem.element import Elements, Material
+from etc_engine.dtem.element import Material
 from etc_engine.dtem.methods import find_method, flux_modes
 from etc_engine.dtem.sides import NO_CUTS, ContactSides, check_arcs, contact_sides, insulated_cuts
 from etc_engine.errors import InputError
@@ -122,10 +122,7 @@ def solve_steady(
     """
     if network.packing.dimension != 2:
         raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
-    material = Material(
-        _positive(conductivity, network.packing.count, "conductivity", zero=False),
-        _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True),
-    )
+    material = make_material(network, conductivity, contact_resistance)
     variant, modes = find_method(method), flux_modes(method, modes)
     if backbone is None:
         backbone = find_backbone(network, axes)
@@ -141,7 +138,7 @@ def solve_steady(
     if not kept.all():  # what carries no heat must still be a valid geometry
         check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), driven)))
     elements = variant.elements(sides, replace(material, contact_resistance=material.contact_resistance[kept]), modes)
-    system = _load(reduced, axes, backbone, sides, elements)
+    system = assemble(elements, *prescribe(reduced, axes, backbone, sides, elements.modes))
     u, reports = _solve(system, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
@@ -165,14 +162,22 @@ def driven_walls(network: ContactNetwork, axes: tuple[int, ...]) -> NDArray[np.b
     return np.asarray((network.walls // 2 == axes[0]) & (not network.packing.box.periodic[axes[0]]))
 
 
-def _load(
-    reduced: ContactNetwork, axes: tuple[int, ...], backbone: Backbone, sides: ContactSides, elements: Elements
-) -> LinearSystem:
-    """Prescribe the walls of a walled axis, or the jumps of periodic axes with one node pinned a cluster.
+def make_material(network: ContactNetwork, conductivity: ArrayLike, contact_resistance: ArrayLike) -> Material:
+    """The material of a network, arguments as in `solve_steady`."""
+    return Material(
+        _positive(conductivity, network.packing.count, "conductivity", zero=False),
+        _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True),
+    )
+
+
+def prescribe(
+    reduced: ContactNetwork, axes: tuple[int, ...], backbone: Backbone, sides: ContactSides, modes: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Lift and prescribed nodes: the walls of a walled axis, or the jumps of periodic axes and a pinned node a cluster.
 
     Walls and jumps are uniform over a contact: they load mode 0, and a wall holds the other modes at 0.
     """
-    m, modes = reduced.count, elements.modes
+    m = reduced.count
     prescribed = np.zeros((m + reduced.walls.size, modes), dtype=np.bool_)
     lift = np.zeros((sides.nodes.size, modes, len(axes)))
     if reduced.packing.box.periodic[axes[0]]:
@@ -182,7 +187,7 @@ def _load(
     else:
         prescribed[m:] = True
         lift[:, 0, 0] = np.concatenate([np.zeros(m), 1.0 - reduced.walls % 2])[sides.nodes]
-    return assemble(elements, lift.reshape(-1, len(axes)), prescribed.ravel())
+    return lift.reshape(-1, len(axes)), prescribed.ravel()
 
 
 def _solve(system: LinearSystem, tolerance: float) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:

@@ -1,5 +1,15 @@
 """Linear solvers: arrays in, arrays out, and a report of what was reached."""
 
 from etc_engine.solvers.amg_cg import Preconditioner, SolveReport, build_preconditioner, solve_energy
+from etc_engine.solvers.reduced_basis import FamilySolution, Member, TrialSpace, solve_family
 
-__all__ = ["Preconditioner", "SolveReport", "build_preconditioner", "solve_energy"]
+__all__ = [
+    "FamilySolution",
+    "Member",
+    "Preconditioner",
+    "SolveReport",
+    "TrialSpace",
+    "build_preconditioner",
+    "solve_energy",
+    "solve_family",
+]

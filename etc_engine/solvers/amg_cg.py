@@ -65,6 +65,8 @@ class SolveReport:
     imbalance : float
         |sum of the nodal residuals| / E: heat that enters and does not leave, relative to the flux.
     setup_seconds, solve_seconds : float
+    smallest_ritz : float
+        Smallest Ritz value of M^-1 K, never below its smallest eigenvalue; NaN without iterations.
     """
 
     unknowns: int
@@ -75,6 +77,7 @@ class SolveReport:
     imbalance: float
     setup_seconds: float
     solve_seconds: float
+    smallest_ritz: float = np.nan
 
 
 def build_preconditioner(matrix: csr_matrix, exact_level: int = EXACT_LEVEL) -> Preconditioner:
@@ -137,6 +140,7 @@ def solve_energy(
     tolerance: float = 1e-10,
     balance_tolerance: float = 1e-8,
     max_iterations: int = 300,
+    spectral_floor: float | None = None,
 ) -> tuple[NDArray[np.float64], SolveReport]:
     """Solve K u = b until the energy E = lift_energy - b . u is known to a relative tolerance.
 
@@ -156,6 +160,8 @@ def solve_energy(
     balance_tolerance : float
         ... and |sum r| is at most ``balance_tolerance * E``.
     max_iterations : int
+    spectral_floor : float, optional
+        A mu <= lambda_min(M^-1 K) that is known; the smaller of it and of half the smallest Ritz value counts.
 
     Returns
     -------
@@ -193,6 +199,7 @@ def solve_energy(
     steps: list[float] = []
     ratios: list[float] = []
     history = [float(np.linalg.norm(r)) / rhs_norm]
+    ritz = np.nan
 
     def report(error: float, imbalance: float) -> SolveReport:
         seconds = time.perf_counter() - start
@@ -205,6 +212,7 @@ def solve_energy(
             imbalance,
             preconditioner.seconds,
             seconds,
+            ritz,
         )
 
     if rho == 0.0:
@@ -223,7 +231,9 @@ def solve_energy(
         ratios.append(rho_next / rho)
         # E_lift - 2 b.u + u.K u, which holds for any iterate
         energy = max(lift_energy - float(u @ (rhs + r)), ROUND_OFF * lift_energy)
-        error = max(radau_factor(steps, ratios) * rho_next, 0.0) / energy
+        ritz = smallest_ritz_value(steps, ratios)
+        mu = min(0.5 * ritz, np.inf if spectral_floor is None else spectral_floor)
+        error = max(radau_factor(steps, ratios, mu) * rho_next, 0.0) / energy
         imbalance = abs(float(r.sum())) / energy
         if error <= tolerance and imbalance <= balance_tolerance:
             return u, report(error, imbalance)
@@ -243,7 +253,15 @@ def solve_energy(
     )
 
 
-def radau_factor(steps: list[float], ratios: list[float]) -> float:
+def smallest_ritz_value(steps: list[float], ratios: list[float]) -> float:
+    """Smallest eigenvalue of the tridiagonal matrix of k CG steps, arguments as in `radau_factor`."""
+    gamma, delta = np.asarray(steps), np.asarray(ratios[:-1])
+    diagonal = 1.0 / gamma
+    diagonal[1:] += delta / gamma[:-1]
+    return float(eigvalsh_tridiagonal(diagonal, np.sqrt(delta) / gamma[:-1], select="i", select_range=(0, 0))[0])
+
+
+def radau_factor(steps: list[float], ratios: list[float], mu: float | None = None) -> float:
     """Factor g_k of the Gauss-Radau estimate |u - u_k|_K^2 = g_k rho_k after k CG steps.
 
     Parameters
@@ -252,11 +270,10 @@ def radau_factor(steps: list[float], ratios: list[float]) -> float:
         Step lengths gamma_0 .. gamma_{k-1}.
     ratios : list of float
         rho_1/rho_0 .. rho_k/rho_{k-1}.
+    mu : float, optional
+        Half the smallest Ritz value by default.
     """
-    gamma, delta = np.asarray(steps), np.asarray(ratios[:-1])
-    diagonal = 1.0 / gamma
-    diagonal[1:] += delta / gamma[:-1]
-    mu = 0.5 * eigvalsh_tridiagonal(diagonal, np.sqrt(delta) / gamma[:-1], select="i", select_range=(0, 0))[0]
+    mu = 0.5 * smallest_ritz_value(steps, ratios) if mu is None else mu
     factor = 1.0 / mu
     for step, ratio in zip(steps, ratios, strict=True):
         beyond = factor - step
