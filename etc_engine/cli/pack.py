@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from pathlib import Path
+from typing import Any
 
 import click
 
 
 @click.command("pack")
-@click.option("--method", default="advancing-front", show_default=True, help="Packing algorithm.")
+@click.option(
+    "--method",
+    default="advancing-front",
+    show_default=True,
+    help="advancing-front (2D, walls), lubachevsky-stillinger or random-sequential.",
+)
 @click.option("--growth-rate", type=float, help="Growth rate of lubachevsky-stillinger.")
 @click.option(
     "--radii",
     required=True,
-    help="equal, uniform:a:b, gaussian:mean:sd, lognormal:mean:sd or bidisperse:a:b:fraction.",
+    help="equal[:r], uniform:a:b, gaussian:mean:sd, lognormal:mean:sd or bidisperse:a:b:fraction.",
 )
-@click.option("--box", required=True, help="Edge lengths, such as 1,1.")
+@click.option("--box", required=True, help="Edge lengths, such as 1,1 or 1,1,1.")
 @click.option("--count", type=int, help="Number of particles.")
-@click.option("--density", type=float, help="Sum of the particle areas over the box area.")
+@click.option("--density", type=float, help="Sum of the particle areas (volumes) over the box's.")
 @click.option("--periodic", default="", help="Periodic axes: x, y, xy or xyz; walls elsewhere.")
 @click.option("--seed", type=int, help="Seed of the random stream; a new one is drawn and told without it.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="CSV file to write.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the packing.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="File to write: .csv, .dump or .lammpstrj (LAMMPS), .nc (netCDF) or .vtp (VTK).",
+)
+@click.option("--plot", type=click.Path(path_type=Path), help="Picture of the packing and its structure.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def pack_command(
     method: str,
@@ -37,13 +50,15 @@ def pack_command(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Make a random packing and write it as CSV."""
+    """Make a random packing and write it to a file, in the format of its ending."""
     from numpy.random import SeedSequence, default_rng
 
     from etc_engine.cli.options import check_picture, check_place, parse_box, print_json, replacing
+    from etc_engine.cli.progress import PackingProgress
     from etc_engine.errors import InputError
     from etc_engine.packing import PackingSpec, pack
-    from etc_engine.packing.files import ParticleTable, write_csv
+    from etc_engine.packing.files import ParticleTable
+    from etc_engine.packing.formats import write_particles
     from etc_engine.packing.neighbors import neighbor_pairs
     from etc_engine.packing.radii import parse_radii
 
@@ -57,21 +72,33 @@ def pack_command(
         density=density,
         growth_rate=growth_rate,
     )
+    _check_format(output)
     if plot is not None:
         check_picture(plot)
         check_place(plot)
     seed = int(SeedSequence().generate_state(1)[0]) if seed is None else seed
     with replacing(output) as file:
         start = time.perf_counter()
-        packing = pack(spec, default_rng(seed))
+        with PackingProgress() as progress:
+            packing = pack(spec, default_rng(seed), progress.report)
         seconds = time.perf_counter() - start
         contacts = neighbor_pairs(packing, relative_gap=1e-6).count
-        write_csv(file, ParticleTable(packing))
+        options = {
+            "method": method,
+            "growth-rate": growth_rate,
+            "radii": radii,
+            "box": box,
+            "count": count,
+            "density": density,
+            "periodic": periodic or None,
+            "seed": seed,
+        }
+        write_particles(file, ParticleTable(packing), _provenance(options, output))
     if plot is not None:
-        from etc_engine.figures import save_packing
+        from etc_engine.figures import save_structure
 
         with replacing(plot) as file:
-            save_packing(packing, file)
+            save_structure(packing, file)
     record = {
         "particles": packing.count,
         "density": packing.density,
@@ -85,3 +112,23 @@ def pack_command(
     else:
         for name, value in record.items():
             click.echo(f"{name:14s}{f'{value:.8g}' if isinstance(value, float) else value}")
+
+
+def _check_format(output: Path) -> None:
+    """Refuse a file that could not be written, before the work begins."""
+    from etc_engine.packing.formats import VTP, format_to_write
+    from etc_engine.packing.vtp import require_vtk
+
+    if format_to_write(output) is VTP:
+        require_vtk()
+
+
+def _provenance(options: dict[str, Any], output: Path) -> dict[str, Any]:
+    """What makes the packing again: method, radii, seed, and the command with the seed that was drawn."""
+    words = [word for name, value in options.items() if value is not None for word in (f"--{name}", str(value))]
+    return {
+        "method": options["method"],
+        "radii": options["radii"],
+        "seed": str(options["seed"]),  # it may be larger than any integer of netCDF
+        "command": shlex.join(["etc-engine", "pack", *words, "-o", str(output)]),
+    }

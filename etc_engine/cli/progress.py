@@ -1,4 +1,4 @@
-"""The progress of a sweep: a bar on a terminal, a line a minute elsewhere."""
+"""The progress of a sweep: a bar on a terminal, a line a minute elsewhere; and of a packing: a bar on a terminal."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any
 import click
 
 LINE_SECONDS = 60.0
+BAR_DELAY = 1.0
+"""A packing that takes less than this many seconds shows no bar."""
 
 
 class Progress:
@@ -45,6 +47,35 @@ class Progress:
         self._bar.update(done - self._bar.n)
 
     def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+class PackingProgress:
+    """Shows the fraction of a packing that is done as a bar on a terminal's stderr; nothing elsewhere."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+
+    def report(self, fraction: float) -> None:
+        """Take in the fraction done; what was shown never shrinks."""
+        if not sys.stderr.isatty():
+            return
+        if self._bar is None:
+            import tqdm
+
+            form = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
+            self._bar = tqdm.tqdm(
+                desc="packing", total=1.0, delay=BAR_DELAY, bar_format=form, leave=False, file=sys.stderr
+            )
+        self._bar.update(max(0.0, fraction - self._bar.n))
+
+    def __enter__(self) -> PackingProgress:
         return self
 
     def __exit__(

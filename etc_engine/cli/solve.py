@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
-@click.option("--box", help="Edge lengths, such as 1,1; a dump brings its own.")
-@click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere. A dump brings its own.")
+@click.option("--box", help="Edge lengths, such as 1,1; only for CSV.")
+@click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere; only for CSV.")
 @click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
 @click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced, arc or exact.")
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
@@ -61,7 +61,8 @@ def solve_command(
 ) -> None:
     """Effective conductivity of the disks in a file.
 
-    PARTICLES is a CSV file with the columns x,y,radius[,conductivity] or a LAMMPS/LIGGGHTS text dump. Walls at
+    PARTICLES is a CSV file with the columns x,y,radius[,conductivity], a LAMMPS/LIGGGHTS text dump, or a netCDF
+    (.nc) or VTK (.vtp) file as ``pack`` writes it; all but CSV bring their own box. Walls at
     x = 0 (temperature 1) and x = L (temperature 0), unless the box is periodic along x.
     """
     start = time.perf_counter()
@@ -103,29 +104,21 @@ def solve_command(
 
 
 def _read(particles: Path, box: str | None, periodic: str | None, frame: int | None) -> ParticleTable:
-    """A CSV file or a dump, told apart by their first word."""
+    """A particle file of any format, and its box if it brings none."""
     from etc_engine.cli.options import parse_box
     from etc_engine.errors import InputError
-    from etc_engine.packing.dumps import read_dump
-    from etc_engine.packing.files import read_csv
+    from etc_engine.packing.formats import format_to_read, read_particles
 
-    if _is_dump(particles):
-        if box is not None or periodic is not None:
-            raise InputError(f"{particles} is a dump that brings its own box: leave --box and --periodic out")
-        return read_dump(particles, -1 if frame is None else frame)
-    if frame is not None:
+    kind = format_to_read(particles)
+    if frame is not None and not kind.has_frames:
         raise InputError(f"--frame goes with a dump; {particles} is none")
+    if kind.brings_box:
+        if box is not None or periodic is not None:
+            raise InputError(f"{particles} is a {kind.name} that brings its own box: leave --box and --periodic out")
+        return read_particles(particles, frame=frame)
     if box is None:
         raise InputError("--box is missing: give the edge lengths of the box, such as --box 1,1")
-    return read_csv(particles, parse_box(box, periodic or ""))
-
-
-def _is_dump(path: Path) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(5) == b"ITEM:"
-    except OSError:
-        return False  # the reader of CSV files says what is wrong
+    return read_particles(particles, parse_box(box, periodic or ""))
 
 
 @dataclass(frozen=True)

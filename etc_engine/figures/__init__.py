@@ -5,15 +5,18 @@ from etc_engine.figures.comparison import draw_comparison, save_comparison
 from etc_engine.figures.convergence import draw_convergence, draw_histograms, draw_system_sizes
 from etc_engine.figures.field import save_field
 from etc_engine.figures.packing import save_packing
+from etc_engine.figures.structure import draw_structure, save_structure
 
 __all__ = [
     "draw_comparison",
     "draw_convergence",
     "draw_histograms",
+    "draw_structure",
     "draw_system_sizes",
     "png",
     "save",
     "save_comparison",
     "save_field",
     "save_packing",
+    "save_structure",
 ]

@@ -37,7 +37,12 @@ def draw_packing(packing: ParticlePacking) -> Figure:
     width, height = packing.box.lengths[:2]
     size = 6.0 / max(width, height)
     figure = new_figure(max(width * size, 2.0) + 1.4, max(height * size, 1.5) + 0.8)
-    axes = figure.add_subplot()
+    draw_particles(figure.add_subplot(), packing)
+    return figure
+
+
+def draw_particles(axes: Axes, packing: ParticlePacking) -> None:
+    """Draw the particles of a packing to scale, in its box."""
     centers, radii, depth = _seen(packing)
     spheres = packing.dimension == 3
     shade = depth if spheres else radii
@@ -57,7 +62,7 @@ def draw_packing(packing: ParticlePacking) -> Figure:
     discs.set_clim(low if spheres else 2.0 * low - 1.2 * high, high if spheres else 1.8 * high - 0.4 * low)
     axes.add_collection(discs)
     if high - low > 1e-9 * high:
-        bar = figure.colorbar(discs, ax=axes, shrink=0.5, aspect=25, pad=0.02)
+        bar = axes.figure.colorbar(discs, ax=axes, shrink=0.5, aspect=25, pad=0.02)
         bar.set_label("height z [m]" if spheres else "radius [m]", fontsize=9)
         bar.ax.set_ylim(low, high)
         bar.ax.tick_params(labelsize=8)
@@ -67,9 +72,9 @@ def draw_packing(packing: ParticlePacking) -> Figure:
     axes.set_ylabel("y [m]", fontsize=9)
     axes.tick_params(labelsize=8)
     kind = "spheres" if spheres else "disks"
-    axes.set_title(f"{packing.count} {kind}, density {packing.density:.4f}", fontsize=10)
+    seen = ", seen along z" if spheres else ""
+    axes.set_title(f"{packing.count} {kind}, density {packing.density:.4f}{seen}", fontsize=10)
     axes.spines[:].set_visible(False)
-    return figure
 
 
 def _seen(packing: ParticlePacking) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -16,7 +16,7 @@ from etc_engine.packing.density import set_density
 from etc_engine.packing.lubachevsky_stillinger import compress
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.radii import RadiusDistribution
-from etc_engine.packing.random_sequential import SATURATION, insert_randomly
+from etc_engine.packing.random_sequential import SATURATION, insert_randomly, refuse_wide_particles
 
 Progress = Callable[[float], None]
 """Called now and then with the fraction of the work that is done."""
@@ -112,6 +112,8 @@ def _scaled_sizes(spec: PackingSpec, rng: np.random.Generator) -> NDArray[np.flo
     if count is None:
         count = max(1, round(cast(float, spec.density) * spec.box.volume / spec.radii.mean_measure(d)))
     sizes = spec.radii.sample(count, rng)
+    if spec.count is None:
+        refuse_wide_particles(sizes, spec.box)  # lengths are meant: one disk wider than the box is no packing
     if spec.density is None:
         return sizes
     measures = np.pi * sizes**2 if d == 2 else 4.0 / 3.0 * np.pi * sizes**3

@@ -64,8 +64,16 @@ def count_frames(path: Path | str) -> int:
 
 
 def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> None:
-    """Write particles as one frame of a LAMMPS text dump, with as many digits as read back the same numbers."""
+    """Write particles as one frame of a LAMMPS text dump, with as many digits as read back the same numbers.
+
+    Raises
+    ------
+    InputError
+        If spheres lie in one plane: a dump does not tell them from disks.
+    """
     packing = table.packing
+    if packing.dimension == 3 and _is_flat(packing.centers[:, 2], packing.radii):
+        raise InputError("spheres at one height would be read from a dump as disks: write .csv, .nc or .vtp instead")
     flags = [("pp" if flag else "ff") for flag in packing.box.periodic]
     lengths = list(packing.box.lengths)
     if packing.dimension == 2:  # LAMMPS keeps a slab of unit height about a plane, periodic across it
@@ -147,7 +155,7 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
     positions = [
         _positions(path, columns, axis, bounds[axis]) for axis in range(3) if axis < 2 or "z" in _spelled(columns)
     ]
-    flat = len(positions) == 2 or np.ptp(positions[2]) <= FLAT * radii.max()
+    flat = len(positions) == 2 or _is_flat(positions[2], radii)
     dimension = 2 if flat else 3
     box = Box(
         tuple(float(high - low) for low, high in bounds[:dimension]),
@@ -155,6 +163,10 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
     )
     centers = np.stack(positions[:dimension], axis=1) - bounds[:dimension, 0]
     return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"))
+
+
+def _is_flat(heights: NDArray[np.float64], radii: NDArray[np.float64]) -> bool:
+    return bool(np.ptp(heights) <= FLAT * radii.max())
 
 
 def _spelled(columns: dict[str, NDArray[np.float64]]) -> set[str]:

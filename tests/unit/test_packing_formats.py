@@ -1,0 +1,127 @@
+"""Particle files of every format: what is written reads back to the last bit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from etc_engine.box import Box
+from etc_engine.errors import EtcError, InputError
+from etc_engine.packing.files import ParticleTable
+from etc_engine.packing.formats import format_to_read, format_to_write, read_particles, write_particles
+from etc_engine.packing.particles import ParticlePacking
+
+ENDINGS = ("csv", "dump", "lammpstrj", "nc", "vtp")
+
+
+def need(ending: str) -> None:
+    if ending == "vtp":
+        pytest.importorskip("vtkmodules", reason="the extra vtk is not installed")
+
+
+@st.composite
+def tables(draw) -> ParticleTable:
+    """Particles of any size at any place of any box."""
+    d = draw(st.sampled_from((2, 3)))
+    scale = 10.0 ** draw(st.integers(-9, 6))
+    lengths = tuple(scale * draw(st.floats(0.1, 10.0)) for _ in range(d))
+    periodic = tuple(draw(st.booleans()) for _ in range(d))
+    count = draw(st.integers(2, 6))
+    rng = np.random.default_rng(draw(st.integers(100, 10**9)))
+    centers = rng.random((count, d)) * lengths
+    conductivity = rng.lognormal(0.0, 3.0, count) if draw(st.booleans()) else None
+    return ParticleTable(ParticlePacking(centers, scale * rng.random(count), Box(lengths, periodic)), conductivity)
+
+
+def assert_same(found: ParticleTable, given_: ParticleTable) -> None:
+    assert found.packing.box == given_.packing.box
+    np.testing.assert_array_equal(found.packing.centers, given_.packing.centers)
+    np.testing.assert_array_equal(found.packing.radii, given_.packing.radii)
+    assert (found.conductivity is None) == (given_.conductivity is None)
+    if given_.conductivity is not None:
+        np.testing.assert_array_equal(found.conductivity, given_.conductivity)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(table=tables())
+def test_what_is_written_reads_back_to_the_last_bit(tmp_path, ending, table):
+    need(ending)
+    path = tmp_path / f"packing.{ending}"
+    write_particles(path, table)
+    assert_same(read_particles(path, table.packing.box if ending == "csv" else None), table)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_file_is_known_by_its_content(tmp_path, ending):
+    need(ending)
+    path = tmp_path / f"packing.{ending}"
+    write_particles(path, ParticleTable(ParticlePacking([[0.5, 0.5]], [0.1], Box((1.0, 1.0)))))
+    renamed = path.rename(tmp_path / "packing")
+    assert format_to_read(renamed) is format_to_write(path)
+
+
+def test_an_unknown_ending_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"written as \.csv, \.dump, \.lammpstrj, \.nc, \.vtp: found"):
+        format_to_write(tmp_path / "packing.txt")
+
+
+def test_spheres_at_one_height_are_no_disks(tmp_path):
+    flat = ParticleTable(ParticlePacking([[0.5, 0.5, 0.5]], [0.1], Box((1.0, 1.0, 1.0))))
+    with pytest.raises(InputError, match="would be read from a dump as disks"):
+        write_particles(tmp_path / "a.dump", flat)
+    for ending in ("nc", "csv"):
+        write_particles(tmp_path / f"a.{ending}", flat)
+        assert_same(read_particles(tmp_path / f"a.{ending}", flat.packing.box if ending == "csv" else None), flat)
+
+
+def test_box_and_frame_go_with_their_formats(tmp_path):
+    table = ParticleTable(ParticlePacking([[0.5, 0.5]], [0.1], Box((1.0, 1.0))))
+    for ending in ("csv", "nc"):
+        write_particles(tmp_path / f"a.{ending}", table)
+    with pytest.raises(InputError, match="no box: give one"):
+        read_particles(tmp_path / "a.csv")
+    with pytest.raises(InputError, match="brings its own box"):
+        read_particles(tmp_path / "a.nc", Box((1.0, 1.0)))
+    with pytest.raises(InputError, match="frame goes with a dump"):
+        read_particles(tmp_path / "a.nc", frame=0)
+
+
+@pytest.mark.parametrize(
+    ("drop", "words"), [("box", "'box' and 'periodic' are missing"), ("radius", "found no radius")]
+)
+def test_netcdf_without_a_packing_is_refused(tmp_path, drop, words):
+    from etc_engine.packing.netcdf import packing_dataset
+
+    dataset = packing_dataset(ParticleTable(ParticlePacking([[0.5, 0.5]], [0.1], Box((1.0, 1.0)))))
+    if drop in dataset:
+        dataset = dataset.drop_vars(drop)
+    else:
+        del dataset.attrs[drop]
+    dataset.to_netcdf(tmp_path / "a.nc", engine="netcdf4")
+    with pytest.raises(InputError, match=words):
+        read_particles(tmp_path / "a.nc")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"\x89HDF\r\n\x1a\nrubbish", b"CDF\x01", b"<?xml version='1.0'?>\n<VTKFile", b"<VTKFile type='PolyData'/>"],
+)
+def test_broken_files_are_refused_in_one_line_and_silence(tmp_path, capfd, content):
+    if b"VTK" in content:
+        need("vtp")
+    (tmp_path / "a").write_bytes(content)
+    with pytest.raises(EtcError, match="cannot be read as"):
+        read_particles(tmp_path / "a")
+    assert capfd.readouterr().err == ""
+
+
+def test_formats_load_neither_xarray_nor_vtk_before_they_are_needed():
+    code = "import sys, etc_engine.packing.formats\nprint({'xarray', 'netCDF4', 'vtkmodules'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
