@@ -63,6 +63,19 @@ def test_bounds_of_random_disks_contain_the_converged_value():
             assert low < best < high
 
 
+@pytest.mark.parametrize("ratio", [3.0, 10.0, 30.0])
+def test_strongly_unequal_disks_converge(ratio):
+    """A large disk between two small ones that reach over the walls; their arcs are up to 34 degrees wide."""
+    small = 0.5 / (ratio + 2.0)
+    large = ratio * small
+    radii = [1.2 * small, large, 1.2 * small]
+    packing = ParticlePacking([[small, 0.5], [0.5, 0.5], [1 - small, 0.5]], radii, Box((1.0, 1.0)))
+    network = overlap_contacts(packing)
+    widths = [np.ptp(bounds_of(network, modes)) / bounds_of(network, modes)[0] for modes in (1, 3, 5)]
+    assert widths[2] < 1e-5
+    assert widths[2] < widths[1] < widths[0]
+
+
 def test_bounds_scale_with_the_conductivity(feng_particles):
     network = overlap_contacts(feng_particles)
     np.testing.assert_allclose(bounds_of(network, 3, conductivity=7.0), 7.0 * bounds_of(network, 3), rtol=1e-12)
