@@ -185,7 +185,7 @@ def conductivity_bounds(result: EffectiveConductivity) -> NDArray[np.float64]:
     >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
     >>> result = effective_conductivity(bonded_contacts(packing, 0.1), method="exact", axes=(0,))
     >>> conductivity_bounds(result)[0].round(6)
-    array([0.214853, 0.214853])
+    array([0.214842, 0.214842])
     """
     bounds = np.full((result.tensor.shape[0], 2), np.nan)
     for solution in result.solutions:

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import truncnorm
 
 from etc_engine.errors import InputError
 
@@ -185,6 +184,8 @@ def _uniform_moment(p: tuple[float, ...], order: int) -> float:
 
 
 def _truncated_normal(p: tuple[float, ...]) -> Any:
+    from scipy.stats import truncnorm  # a second of import that only this distribution needs
+
     return truncnorm(-GAUSSIAN_CUT, GAUSSIAN_CUT, loc=p[0], scale=p[1])
 
 

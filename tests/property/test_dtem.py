@@ -118,7 +118,7 @@ def test_contact_resistance_equals_the_doubled_system(resistance, method):
     reduced = network.select(backbone.contacts, backbone.wall_contacts)
     sides = contact_sides(reduced)
     m, w = reduced.count, reduced.walls.size
-    elements = closed_form_elements(sides, Material(np.ones(packing.count), np.zeros(m + w)), method)
+    elements = closed_form_elements(sides, Material(np.ones(packing.count), np.zeros(m + w)), method=method)
     # every side has its own face temperature; behind a wall's bar lies the wall
     faces = sides.nodes.size
     rows, columns, values = [], [], []
