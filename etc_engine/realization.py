@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -12,11 +12,21 @@ from numpy.typing import NDArray
 
 from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.dtem.methods import METHODS as DTEM_METHODS
-from etc_engine.effective import effective_conductivity, find_backbones, mean_field_conductivity
+from etc_engine.effective import (
+    CurvePoint,
+    EffectiveConductivity,
+    conductivity_curve,
+    effective_conductivity,
+    find_backbones,
+    mean_field_conductivity,
+)
 from etc_engine.errors import ConvergenceError, EtcError, InputError, PackingError
 from etc_engine.packing import PackingSpec, ParticlePacking, pack
 from etc_engine.packing.structure import solid_fraction
 from etc_engine.percolation import Backbone
+
+CURVE_ANGLES = 4
+"""From this many half-angles on, solving them together saves time."""
 
 
 class Status(IntEnum):
@@ -86,6 +96,9 @@ class ConductionSpec:
         A second material for part of the particles.
     tolerance : float
         Relative error of the conductivity left by the iterative solver.
+    angle_curve : str
+        ``reduced`` solves many prescribed half-angles of one packing together, by a reduced basis, to an estimated
+        relative error of ``min(1e-8, 100 tolerance)`` at most; ``full`` solves each alone.
     """
 
     engine: str = "dtem"
@@ -94,6 +107,7 @@ class ConductionSpec:
     contact_resistance: float = 0.0
     mixture: Mixture | None = None
     tolerance: float = 1e-10
+    angle_curve: str = "reduced"
 
 
 @dataclass(frozen=True)
@@ -110,7 +124,8 @@ class Cell:
     """The outcome for one contact angle and one method.
 
     ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
-    ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network.
+    ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``solved_by`` is ``full``, or
+    ``reduced`` where the conductivity comes from the solutions at other contact angles, ``snapshots`` of them.
     """
 
     status: Status
@@ -124,6 +139,8 @@ class Cell:
     relative_energy_error: float = np.nan
     solve_seconds: float = 0.0
     mean_field_conductivity: float = np.nan
+    solved_by: str = ""
+    snapshots: int = 0
 
 
 Cells = tuple[tuple[Cell, ...], ...]
@@ -193,15 +210,51 @@ def conduct_dtem(packing: ParticlePacking, spec: RealizationSpec, rng: np.random
     except EtcError as error:
         return _uniform(spec, Cell(Status.ERROR, str(error)))
     kappa = particle_conductivities(packing.count, spec.conduction, rng)
-    return tuple(
-        tuple(
-            _dtem_cell(
-                network if angle is None else network.with_half_angle(angle), backbones, spec.conduction, kappa, method
-            )
-            for method in spec.conduction.methods
-        )
-        for angle in angles
+    networks = [network if angle is None else network.with_half_angle(angle) for angle in angles]
+    curve = _dtem_curve if _is_curve(spec) else _dtem_each
+    columns = [curve(networks, spec, backbones, kappa, method) for method in spec.conduction.methods]
+    return tuple(zip(*columns, strict=True))
+
+
+def _is_curve(spec: RealizationSpec) -> bool:
+    """Whether the half-angles are solved together."""
+    return spec.conduction.angle_curve == "reduced" and len(spec.contacts.contact_angles) >= CURVE_ANGLES
+
+
+def _dtem_each(
+    networks: Sequence[ContactNetwork],
+    spec: RealizationSpec,
+    backbones: Mapping[tuple[int, ...], Backbone],
+    kappa: NDArray[np.float64],
+    method: str,
+) -> list[Cell]:
+    return [_dtem_cell(network, backbones, spec.conduction, kappa, method) for network in networks]
+
+
+def _dtem_curve(
+    networks: Sequence[ContactNetwork],
+    spec: RealizationSpec,
+    backbones: Mapping[tuple[int, ...], Backbone],
+    kappa: NDArray[np.float64],
+    method: str,
+) -> list[Cell]:
+    """Cells of all half-angles by a reduced basis; what that cannot solve goes the usual way, which says why."""
+    resistance = spec.conduction.contact_resistance
+    points = conductivity_curve(
+        networks[0],
+        spec.contacts.contact_angles,
+        method=method,
+        conductivity=kappa,
+        contact_resistance=resistance,
+        tolerance=spec.conduction.tolerance,
+        backbones=backbones,
     )
+    return [
+        _dtem_cell(network, backbones, spec.conduction, kappa, method)
+        if point is None
+        else _solved_cell(network, point, kappa, resistance, point.seconds, point.snapshots)
+        for network, point in zip(networks, points, strict=True)
+    ]
 
 
 def contact_network(packing: ParticlePacking, contacts: ContactSpec) -> ContactNetwork:
@@ -237,6 +290,17 @@ def _dtem_cell(
         return Cell(Status.NOT_CONVERGED, str(error))
     except EtcError as error:
         return Cell(Status.ERROR, str(error))
+    return _solved_cell(network, result, kappa, resistance, time.perf_counter() - start)
+
+
+def _solved_cell(
+    network: ContactNetwork,
+    result: EffectiveConductivity | CurvePoint,
+    kappa: NDArray[np.float64],
+    resistance: float,
+    seconds: float,
+    snapshots: int = 0,
+) -> Cell:
     missing = result.missing_axes
     return Cell(
         status=Status.NOT_PERCOLATING if missing else Status.OK,
@@ -249,7 +313,9 @@ def _dtem_cell(
         iterations=result.iterations,
         relative_energy_error=result.relative_energy_error,
         mean_field_conductivity=mean_field_conductivity(network, conductivity=kappa, contact_resistance=resistance),
-        solve_seconds=time.perf_counter() - start,
+        solve_seconds=seconds,
+        solved_by="reduced" if snapshots else "full",
+        snapshots=snapshots,
     )
 
 

@@ -157,6 +157,7 @@ class ConductionTable(_Table):
     tolerance: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] = Field(
         default=1e-10, description="a relative error of the conductivity, between 0 and 1"
     )
+    angle_curve: Literal["reduced", "full"] = Field(default="reduced", description="reduced or full")
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -291,6 +292,7 @@ class Study(_Table):
                 contact_resistance=conduction.contact_resistance,
                 mixture=None if mixture is None else Mixture(mixture.conductivity, mixture.fraction),
                 tolerance=conduction.tolerance,
+                angle_curve=conduction.angle_curve,
             ),
         )
 

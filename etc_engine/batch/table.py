@@ -45,9 +45,11 @@ CELL_VARIABLES = {
         np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
     ),
     "solve_seconds": Variable(np.float64, np.nan, "time to solve", "s"),
+    "solved_by": Variable(object, "", "full, or reduced: made of the solutions at other contact angles"),
+    "snapshots": Variable(np.int64, -1, "solutions at other contact angles that a reduced one is made of"),
 }
-HOST = "U64"
-"""Longest name of a host that a row holds."""
+WORD = "U64"
+"""Longest word, such as the name of a host, that a row holds."""
 
 UNIT_VARIABLES = {
     "particles": Variable(np.int64, -1, "number of particles, before pruning"),
@@ -89,8 +91,8 @@ def row_type(study: Study) -> np.dtype[Any]:
     cells = (len(study.contacts.contact_angle or (None,)), len(study.conduction.methods))
     d = study.box.dimension
     fields: list[Any] = [("density_index", np.int64), ("realization", np.int64)]
-    fields += [(name, HOST if v.dtype is object else v.dtype) for name, v in UNIT_VARIABLES.items()]
-    fields += [(name, v.dtype, cells) for name, v in CELL_VARIABLES.items()]
+    fields += [(name, WORD if v.dtype is object else v.dtype) for name, v in UNIT_VARIABLES.items()]
+    fields += [(name, WORD if v.dtype is object else v.dtype, cells) for name, v in CELL_VARIABLES.items()]
     fields += [("status", np.int8, cells), ("conductivity", np.float64, (*cells, d, d))]
     return np.dtype(fields)
 

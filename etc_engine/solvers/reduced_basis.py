@@ -257,8 +257,9 @@ def _reduced(
     flows = member.apply(np.hstack([space.lift, rows]))
     lift_flows, flows = flows[:, : space.loads], flows[:, space.loads :]
     for extra in range(MOST_CORRECTIONS + 1):
-        y = _solve_small(rows.T @ flows, -(rows.T @ lift_flows))
-        if y is None:
+        try:
+            y = _solve_small(rows.T @ flows, -(rows.T @ lift_flows))
+        except np.linalg.LinAlgError:
             return None
         q = lift_flows + flows @ y
         energies = (space.lift + rows @ y).T @ q
@@ -274,15 +275,13 @@ def _reduced(
         added = space.rows(vectors[:, rows.shape[1] :])
         rows, flows = np.hstack([rows, added]), np.hstack([flows, member.apply(added)])
     seconds = time.perf_counter() - start
-    return FamilySolution(vectors @ y, energies, error, reference.proven, basis.snapshots, 0, seconds)
+    u = np.asarray(vectors @ y)
+    return FamilySolution(u, energies, error, reference.proven, basis.snapshots, 0, seconds)
 
 
-def _solve_small(gram: NDArray[np.float64], rhs: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """Solution of the projected system, None if it is not positive definite."""
-    try:
-        return np.asarray(cho_solve(cho_factor(0.5 * (gram + gram.T)), rhs))
-    except np.linalg.LinAlgError:
-        return None
+def _solve_small(gram: NDArray[np.float64], rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solution of the projected system."""
+    return np.asarray(cho_solve(cho_factor(0.5 * (gram + gram.T)), rhs))
 
 
 def _full(

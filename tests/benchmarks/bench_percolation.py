@@ -14,10 +14,11 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from etc_engine import Box, PackingSpec, bonded_contacts, find_backbone, pack, parse_radii
+from etc_engine.dtem.assembly import assemble
 from etc_engine.dtem.element import Material
 from etc_engine.dtem.methods import METHODS
 from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.steady import _load
+from etc_engine.dtem.steady import prescribe
 from etc_engine.solvers import build_preconditioner, solve_energy
 
 
@@ -42,7 +43,8 @@ def main() -> None:
         reduced = network.select(backbone.contacts, backbone.wall_contacts)
         sides = contact_sides(reduced)
         material = Material(np.ones(network.packing.count), np.zeros(reduced.count + reduced.walls.size))
-        system = _load(reduced, (0,), backbone, sides, METHODS["chord"].elements(sides, material))
+        elements = METHODS["chord"].elements(sides, material)
+        system = assemble(elements, *prescribe(reduced, (0,), backbone, sides, elements.modes))
         rhs, lift = np.ascontiguousarray(system.rhs[:, 0]), float(system.lift_energies[0])
         begin = time.perf_counter()
         preconditioner = build_preconditioner(system.matrix)
