@@ -167,6 +167,9 @@ def _write(outputs: _Outputs, result: EffectiveConductivity, field: ParticleFiel
             from etc_engine.figures import save_field
 
             caption = f"{record['method']}: k = {record['conductivity']:.6g} W/(m K), {record['particles']} particles"
+            if "conductivity_bounds" in record:
+                low, high = record["conductivity_bounds"]
+                caption += f", bounds {low:.8g} to {high:.8g}"
             save_field(files.enter_context(replacing(outputs.plot)), solution, field, caption)
 
 

@@ -115,13 +115,7 @@ def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.
     material : Material
     flows : ndarray, shape (s, modes) [W/m]
     """
-    idle = np.asarray(~flows.any(axis=1))
-    uncut = np.zeros(idle.size, dtype=np.bool_)
-    uncut[sides.of_walls] = idle[sides.of_walls]
-    cut_rows = sides.of_walls[sides.cuts.walls]
-    chords = cut_chords(sides, material, uncut, cut_rows, modes=flows.shape[1])
-    on_arc = np.where(uncut, sides.theta, np.nan)
-    on_arc[cut_rows] = np.nan
+    chords, on_arc = chords_of_field(sides, material, flows)
     return _potentials(
         chords,
         material.side_resistances(sides),
@@ -131,6 +125,19 @@ def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.
         on_arc,
         chord_points(chords.levels),
     )
+
+
+def chords_of_field(
+    sides: ContactSides, material: Material, flows: NDArray[np.float64]
+) -> tuple[Chords, NDArray[np.float64]]:
+    """Chords of a whole network with flows (s, modes), and the angle of wall contacts that cut nothing, else NaN."""
+    uncut = np.zeros(sides.nodes.size, dtype=np.bool_)
+    uncut[sides.of_walls] = ~flows[sides.of_walls].any(axis=1)
+    cut_rows = sides.of_walls[sides.cuts.walls]
+    chords = cut_chords(sides, material, uncut, cut_rows, modes=flows.shape[1])
+    on_arc = np.where(uncut, sides.theta, np.nan)
+    on_arc[cut_rows] = np.nan
+    return chords, on_arc
 
 
 def cut_chords(

@@ -20,6 +20,7 @@ from numba import njit
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from etc_engine.dtem.exact_field import exact_temperatures
 from etc_engine.dtem.field import ParticleField
 from etc_engine.dtem.methods import find_method
 from etc_engine.dtem.steady import SteadySolution
@@ -60,6 +61,10 @@ def temperatures_inside(
     Feng, Han, Li, Owen 2008, Eq. 37, doi:10.1016/j.jcp.2008.01.031.
     """
     sides = field.sides
+    if solution.method == "exact":
+        inside = points / solution.network.packing.radii[particles, None]
+        above = exact_temperatures(sides, solution.material, field.flow_modes, particles, inside)
+        return field.particle_temperatures[particles] + above
     uniform = find_method(solution.method).uniform_flux
     values = _evaluate(
         np.ascontiguousarray(particles, dtype=np.int64),

@@ -23,11 +23,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.dtem.cut_disk import chord_point, solve_cut_disk
+from etc_engine.dtem.cut_disk import chord_point
 from etc_engine.dtem.exact import Chords, cut_chords, of_disk
+from etc_engine.dtem.exact_field import loaded_waves
 from etc_engine.dtem.lune import ChordPoints, chord_points
 from etc_engine.dtem.steady import SteadySolution
-from etc_engine.dtem.waves import chord_trace, chord_waves
+from etc_engine.dtem.waves import chord_trace
 
 STEP = 0.4
 """Step along chi; the jump and its fourth-order differences are smooth at the scale 1/modes."""
@@ -77,26 +78,15 @@ def _deviations(
     modes = flows.shape[1]
     for p in range(chords.offsets.size - 1):
         first, count = chords.offsets[p], chords.offsets[p + 1] - chords.offsets[p]
-        coefficients = np.zeros((count, modes))
-        for a in range(count):
-            row = chords.rows[first + a]
-            for k in range(modes):
-                if row >= 0:
-                    coefficients[a, k] = (chords.signs[first + a] if k % 2 else 1.0) * flows[row, k] / conductivity[p]
-        if not np.any(coefficients):
+        loaded, transforms, constants, means = loaded_waves(chords, p, flows, conductivity[p], points)
+        if not loaded:
             continue
-        theta, alpha, exponents, levels = of_disk(chords, p)
-        h = np.empty((count * modes, count * modes))
-        offsets, densities, _ = solve_cut_disk(theta, alpha, exponents, levels, modes, points, h)
-        load = coefficients.ravel()
-        transforms, constants = chord_waves(
-            alpha, exponents, levels, offsets, np.dot(densities, load), coefficients, points
-        )
+        theta, alpha, _, _ = of_disk(chords, p)
         for a in range(count):
             row = chords.rows[first + a]
             if row >= 0:
                 chord_trace(a, chi, theta, alpha, transforms, constants, out[row])
-                out[row] -= np.dot(h[a * modes], load)
+                out[row] -= means[a * modes]
 
 
 @njit(cache=True)

@@ -102,8 +102,12 @@ def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
         products[level, :points, :points] = product
         position = np.tanh(0.5 * chi)
         at = np.polynomial.legendre.legvander(np.arctanh(position * np.tanh(stretch)) / stretch, points - 1)
-        densities = at @ product.T * (step * 0.5 / np.cosh(0.5 * chi) ** 2)[:, None]
-        for part, wave in enumerate((np.cos(phases), np.sin(phases))):  # einsum: no threaded product
+        densities = (
+            np.einsum("xl,ml->xm", at, product, optimize=False) * (step * 0.5 / np.cosh(0.5 * chi) ** 2)[:, None]
+        )
+        for part, wave in enumerate(
+            (np.cos(phases), np.sin(phases))
+        ):  # einsum: no threaded product, the same bits anywhere
             transforms[part, level, :, :points] = np.einsum("kx,xm->km", wave, densities, optimize=False)
     counts = np.array([points for _, points in LEVELS])
     return ChordPoints(counts, flat[0], flat[1], flat[2], flat[3], products, transforms[0], transforms[1], waves)

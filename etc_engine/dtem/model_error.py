@@ -96,7 +96,7 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
     >>> round(chord_error_estimate(solve_steady(bonded_contacts(disk, 0.35), (0, 1))), 3)
-    0.007
+    0.005
     """
     if solution.method != "chord":
         raise InputError(f"the error is estimated for method chord, found a solution by {solution.method}")

@@ -12,6 +12,7 @@ from etc_engine.dtem.cut_disk import solve_cut_disk
 from etc_engine.dtem.element import Material
 from etc_engine.dtem.exact import edge_exponents, exact_elements
 from etc_engine.dtem.field import recover_field
+from etc_engine.dtem.interior import temperatures_inside
 from etc_engine.dtem.lune import LEVELS, chord_points, log_gamma, mode_weights
 from etc_engine.dtem.resistance import mutual_resistance, self_resistance
 from etc_engine.dtem.sides import contact_sides
@@ -230,3 +231,22 @@ def test_corner_outside_a_disk_that_both_walls_cut_is_refused():
 def test_modes_a_method_does_not_have_are_refused(feng_particles, method, modes):
     with pytest.raises(InputError, match="flux mode"):
         effective_conductivity(overlap_contacts(feng_particles), method=method, modes=modes)
+
+
+def test_temperature_inside_is_continuous_across_contacts_and_that_of_the_walls(feng_particles):
+    result = exact(feng_particles, modes=6, axes=(0,))
+    solution, network = result.solutions[0], result.solutions[0].network
+    field = recover_field(solution)
+    centers, radii = feng_particles.centers, feng_particles.radii
+    normals = network.branches / np.linalg.norm(network.branches, axis=1, keepdims=True)
+    across = np.stack([-normals[:, 1], normals[:, 0]], axis=1)
+    i, j = network.pairs.T
+    for s in (-0.8, -0.3, 0.0, 0.6):
+        middle = normals * (radii[i] * np.cos(network.angles[:, 0]))[:, None]
+        place = middle + s * across * (radii[i] * np.sin(network.angles[:, 0]))[:, None]
+        one = temperatures_inside(solution, field, i, place)
+        other = temperatures_inside(solution, field, j, place + centers[i] - centers[j])
+        np.testing.assert_allclose(one, other, atol=5e-6)  # what six modes leave
+    hot = network.wall_particles[network.walls == 0]
+    at_wall = np.stack([-centers[hot, 0], np.full(hot.size, 0.004)], axis=1)
+    np.testing.assert_allclose(temperatures_inside(solution, field, hot, at_wall), 1.0, atol=5e-7)
