@@ -213,3 +213,13 @@ class Terminal(StringIO):
 
     def isatty(self) -> bool:
         return True
+
+
+def test_vtk_files_without_vtk_are_refused_before_the_work(pack, tmp_path, monkeypatch):
+    from etc_engine.packing import vtp
+
+    monkeypatch.setattr(vtp, "find_spec", lambda _: None)
+    done = pack(*SMALL, "-o", tmp_path / "a.vtp")
+    assert done.returncode == 2
+    assert "install the extra with pip install 'etc-engine[vtk]'" in done.stderr
+    assert list(tmp_path.iterdir()) == []
