@@ -36,6 +36,9 @@ import click
     help="File to write: .csv, .dump or .lammpstrj (LAMMPS), .nc (netCDF) or .vtp (VTK).",
 )
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the packing and its structure.")
+@click.option(
+    "--contact-gap", type=float, default=1e-6, show_default=True, help="Largest gap of a contact told, in mean radii."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def pack_command(
     method: str,
@@ -48,6 +51,7 @@ def pack_command(
     seed: int | None,
     output: Path,
     plot: Path | None,
+    contact_gap: float,
     as_json: bool,
 ) -> None:
     """Make a random packing and write it to a file, in the format of its ending."""
@@ -64,6 +68,8 @@ def pack_command(
 
     if seed is not None and seed < 0:
         raise InputError(f"--seed must not be negative, found {seed}")
+    if not 0.0 <= contact_gap <= 1.0:
+        raise InputError(f"--contact-gap must lie between 0 and 1 mean radius, found {contact_gap:g}")
     spec = PackingSpec(
         method=method,
         radii=parse_radii(radii),
@@ -82,7 +88,7 @@ def pack_command(
         with PackingProgress() as progress:
             packing = pack(spec, default_rng(seed), progress.report)
         seconds = time.perf_counter() - start
-        contacts = neighbor_pairs(packing, relative_gap=1e-6).count
+        contacts = neighbor_pairs(packing, relative_gap=contact_gap).count
         options = {
             "method": method,
             "growth-rate": growth_rate,
@@ -98,7 +104,7 @@ def pack_command(
         from etc_engine.figures import save_structure
 
         with replacing(plot) as file:
-            save_structure(packing, file)
+            save_structure(packing, file, contact_gap)
     record = {
         "particles": packing.count,
         "density": packing.density,

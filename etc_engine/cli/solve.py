@@ -109,6 +109,8 @@ def _read(particles: Path, box: str | None, periodic: str | None, frame: int | N
     from etc_engine.errors import InputError
     from etc_engine.packing.formats import format_to_read, read_particles
 
+    if not particles.exists():
+        raise InputError(f"there is no file {particles}")
     kind = format_to_read(particles)
     if frame is not None and not kind.has_frames:
         raise InputError(f"--frame goes with a dump; {particles} is none")

@@ -26,8 +26,6 @@ from etc_engine.packing.statistics import (
 )
 from etc_engine.packing.structure import solid_fraction
 
-CONTACT_GAP = 1e-6
-"""Particles closer than this part of their mean radius are in contact."""
 FARTHEST = 5.0
 """Correlations are drawn up to this many mean diameters."""
 MOST_PAIRS = 4e6
@@ -38,7 +36,7 @@ TANGENT = np.radians(0.01)
 """Contacts of a smaller half-angle are points."""
 
 
-def save_structure(packing: ParticlePacking, path: Path | str) -> None:
+def save_structure(packing: ParticlePacking, path: Path | str, contact_gap: float = 1e-6) -> None:
     """Write a picture of a packing and its structure.
 
     Parameters
@@ -46,16 +44,18 @@ def save_structure(packing: ParticlePacking, path: Path | str) -> None:
     packing : ParticlePacking
     path : path
         File ending in png, pdf, svg or jpg.
+    contact_gap : float
+        Particles closer than this part of their mean radius are in contact.
 
     Raises
     ------
     OutputError
         If the file cannot be written, or its ending is none of these.
     """
-    save(draw_structure(packing), path)
+    save(draw_structure(packing, contact_gap), path)
 
 
-def draw_structure(packing: ParticlePacking) -> Figure:
+def draw_structure(packing: ParticlePacking, contact_gap: float = 1e-6) -> Figure:
     """Figure of a packing, with its structure on the right.
 
     Coordination numbers, half-angles of overlapping contacts, contact directions, pair correlation, two-point
@@ -65,7 +65,7 @@ def draw_structure(packing: ParticlePacking) -> Figure:
     figure = new_figure(16.0, 6.6)
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[1.0, 1.55]))
     draw_particles(left.add_subplot(), packing)
-    contacts = neighbor_pairs(packing, relative_gap=CONTACT_GAP)
+    contacts = neighbor_pairs(packing, relative_gap=contact_gap)
     solid = solid_fraction(packing)
     _draw_coordination(right.add_subplot(2, 3, 1), packing, contacts)
     _draw_half_angles(right.add_subplot(2, 3, 2), packing)
@@ -85,6 +85,7 @@ def _draw_coordination(axes: Axes, packing: ParticlePacking, contacts: NeighborP
     axes.bar(np.arange(shares.size), shares, width=0.8, color=COLOURS[0])
     axes.axvline(float(numbers.mean()), color=COLOURS[1], linewidth=1.2, linestyle="--")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlim(-0.6, max(shares.size, 5) - 0.4)
     _label(axes, "coordination number", "share of the particles", f"coordination, mean {numbers.mean():.3f}")
 
 
@@ -105,23 +106,22 @@ def _draw_rose(axes: PolarAxes, packing: ParticlePacking, contacts: NeighborPair
         _say(axes, "contact directions", "no contacts")
         return
     x, y = contact_directions(packing, contacts).T
-    sectors = np.linspace(0.0, np.pi, 19)
-    shares, _ = np.histogram(np.arctan2(y, x) % np.pi, sectors)
-    heights = np.tile(shares / shares.mean(), 2)
-    middles = 0.5 * (sectors[1:] + sectors[:-1])
-    width = sectors[1]
+    width = np.pi / 18.0  # sectors about 0°, 10°, ...: the directions of crystals lie in their middle
+    sectors = np.rint(np.arctan2(y, x) / width).astype(np.int64) % 18
+    shares = np.bincount(sectors, minlength=18)
+    middles, heights = width * np.arange(18), np.tile(shares / shares.mean(), 2)
     axes.bar(np.concatenate([middles, middles + np.pi]), heights, width=width, color=COLOURS[0], edgecolor="white")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axes.plot(turn, np.ones_like(turn), color=COLOURS[1], linewidth=1.2, linestyle="--")
     axes.tick_params(labelsize=7)
-    axes.set_yticks([0.5, 1.0], ["", "1"])
+    axes.set_yticks([0.5, 1.0], ["", ""])
     axes.grid(True, color="#e6e6e6", linewidth=0.6)
-    axes.set_title("contact directions, 1 if uniform", fontsize=10)
+    axes.set_title("contact directions (dashed: uniform)", fontsize=10)
 
 
 def _draw_cosines(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs) -> None:
     """Direction cosines of contacts in space: uniform on [0, 1] for each axis where there is no preferred one."""
-    title = "contact directions, 1 if uniform"
+    title = "contact directions (dashed: uniform)"
     if not contacts.count:
         _say(axes, "contact directions", "no contacts")
         return
@@ -161,20 +161,20 @@ def _draw_two_point(axes: Axes, packing: ParticlePacking, solid: float) -> None:
 def _write_numbers(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs, solid: float) -> None:
     box = packing.box
     numbers = coordination_numbers(packing, contacts)
-    rattlers = float(find_rattlers(packing, contacts).mean())
+    smallest, largest = packing.radii.min(), packing.radii.max()
     rows = [
         ("particles", f"{packing.count}"),
         ("box [m]", " × ".join(f"{length:g}" for length in box.lengths)),
         ("periodic", box.periodic_axes or "no: walls"),
-        ("radii [m]", f"{packing.radii.min():.4g} to {packing.radii.max():.4g}"),
+        ("radii [m]", f"{smallest:.4g} to {largest:.4g}" if smallest < largest else f"{smallest:.4g}"),
         ("density", f"{packing.density:.6f}"),
         ("solid fraction", f"{solid:.6f}"),
         ("contacts", f"{contacts.count}"),
         ("coordination", f"{numbers.mean():.4f}"),
-        ("rattlers", f"{100.0 * rattlers:.1f} %"),
     ]
     if contacts.count:
-        fabric = fabric_tensor(packing, contacts)
+        rattlers, fabric = find_rattlers(packing, contacts), fabric_tensor(packing, contacts)
+        rows.append(("rattlers", f"{100.0 * rattlers.mean():.1f} %"))
         rows.append(("fabric diagonal", " ".join(f"{value:.3f}" for value in np.diag(fabric))))
         rows.append(("fabric eigenvalues", " ".join(f"{value:.3f}" for value in np.linalg.eigvalsh(fabric)[::-1])))
     axes.set_axis_off()

@@ -6,7 +6,7 @@ import re
 import sys
 
 from etc_engine.cli import progress
-from etc_engine.cli.progress import Progress, progress_line
+from etc_engine.cli.progress import PackingProgress, Progress, progress_line
 
 
 def test_a_log_is_left_alone_for_a_minute(capsys):
@@ -40,3 +40,16 @@ def test_a_terminal_gets_a_bar(capsys, monkeypatch):
     bar = capsys.readouterr().err
     assert "120/120" in bar
     assert "failed cells: 3" in bar
+
+
+def test_a_packing_bar_never_shrinks_and_is_for_terminals(capsys, monkeypatch):
+    with PackingProgress() as shown:
+        shown.report(0.5)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setattr(progress, "BAR_DELAY", 0.0)
+    with PackingProgress() as shown:
+        for fraction in (0.2, 0.6, 0.4, 1.0):
+            shown.report(fraction)
+            assert shown._bar.n == max(fraction, 0.6 if fraction == 0.4 else 0.0)
+    assert "packing:" in capsys.readouterr().err
