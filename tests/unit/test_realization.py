@@ -45,6 +45,54 @@ def test_an_angle_does_not_depend_on_the_others():
     np.testing.assert_array_equal(both.cells[1][0].conductivity, alone.cells[0][0].conductivity)
 
 
+def angle_curve(*degrees, solver="reduced", spec=SPEC, methods=("chord", "standard")):
+    contacts = replace(spec.contacts, contact_angles=tuple(np.radians(degrees)))
+    return run(replace(spec, contacts=contacts, conduction=ConductionSpec(methods=methods, angle_curve=solver)))
+
+
+def test_many_angles_are_solved_together_within_a_tolerance():
+    degrees = (1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 15.0)
+    together, alone = angle_curve(*degrees), angle_curve(*degrees, solver="full")
+    some = angle_curve(*degrees[:5])
+    for m in (0, 1):
+        column, exact = ([row[m] for row in result.cells] for result in (together, alone))
+        words = [cell.solved_by for cell in column]
+        assert "reduced" in words
+        assert 1 <= words.count("full") <= 4
+        assert [cell.snapshots > 0 for cell in column] == [word == "reduced" for word in words]
+        assert all(cell.relative_energy_error <= 1e-8 for cell in column)
+        assert {(cell.solved_by, cell.snapshots) for cell in exact} == {("full", 0)}
+        for a, b in zip(column, exact, strict=True):
+            np.testing.assert_allclose(a.conductivity, b.conductivity, rtol=1e-8)
+            assert (a.contacts, a.unknowns, a.status) == (b.contacts, b.unknowns, b.status)
+            assert a.mean_field_conductivity == b.mean_field_conductivity
+        for a, b in zip(column, [row[m] for row in some.cells], strict=False):
+            np.testing.assert_allclose(a.conductivity, b.conductivity, rtol=1e-8)
+
+
+def test_many_angles_give_the_same_bits_twice():
+    one, other = (angle_curve(1.0, 3.0, 6.0, 9.0, 12.0) for _ in range(2))
+    for a, b in zip(one.cells, other.cells, strict=True):
+        np.testing.assert_array_equal(a[0].conductivity, b[0].conductivity)
+        assert a[0].solved_by == b[0].solved_by
+
+
+def test_an_angle_too_wide_does_not_disturb_the_others():
+    degrees = (2.0, 4.0, 6.0, 8.0, 40.0)
+    together, alone = angle_curve(*degrees), angle_curve(*degrees, solver="full")
+    assert [row[0].status for row in together.cells] == [Status.OK] * 4 + [Status.ERROR]
+    assert together.cells[4][0].message == alone.cells[4][0].message
+    assert together.cells[4][0].solved_by == ""
+    np.testing.assert_allclose(together.cells[3][0].conductivity, alone.cells[3][0].conductivity, rtol=1e-8)
+
+
+def test_below_percolation_many_angles_say_so_too():
+    sparse = replace(SPEC, packing=replace(SPEC.packing, density=0.3))
+    cells = angle_curve(2.0, 4.0, 6.0, 8.0, spec=sparse).cells
+    assert {row[0].status for row in cells} == {Status.NOT_PERCOLATING}
+    assert np.diag(cells[2][0].conductivity).tolist() == [0.0, 0.0]
+
+
 def test_the_same_stream_gives_the_same_bits():
     one, other = run(SPEC), run(SPEC)
     for a, b in zip(one.cells, other.cells, strict=True):

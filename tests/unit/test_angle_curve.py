@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from etc_engine.box import Box
+from etc_engine.contacts import bonded_contacts
+from etc_engine.dtem import angle_curve
+from etc_engine.dtem.angle_curve import solve_angle_curve
+from etc_engine.dtem.element import Material, smallest_ratio
+from etc_engine.dtem.methods import find_method
+from etc_engine.dtem.sides import contact_sides
+from etc_engine.dtem.steady import solve_steady
+from etc_engine.effective import conductivity_curve, effective_conductivity
+from etc_engine.packing import PackingSpec, pack, parse_radii
+from etc_engine.packing.particles import ParticlePacking
+
+
+def packed(radii):
+    spec = PackingSpec("advancing-front", parse_radii(radii), Box((1.0, 1.0)), radius_growth=False)
+    return bonded_contacts(pack(spec, np.random.default_rng(311)), 0.1)
+
+
+@pytest.fixture(scope="module")
+def walled():
+    return packed("uniform:0.02:0.04")
+
+
+def honeycomb(columns=6, rows=4):
+    """Three contacts a disk, 120 degrees apart: arcs of up to 60 degrees fit. Periodic."""
+    a = np.sqrt(3.0)
+    cell = np.array([(0.0, 0.0), (a / 2, 0.5), (a / 2, 1.5), (0.0, 2.0)])
+    corners = np.array([(i * a, 3.0 * j) for i in range(columns) for j in range(rows)])
+    centers = (corners[:, None] + cell + (0.2, 0.3)).reshape(-1, 2)
+    box = Box((columns * a, 3.0 * rows), (True, True))
+    packing = ParticlePacking(centers, np.full(len(centers), 0.5), box)
+    return bonded_contacts(packing, 0.1), np.random.default_rng(312).uniform(0.2, 5.0, len(centers))
+
+
+def energies(network, angles, axes, **options):
+    return [
+        np.diag(solve_steady(network.with_half_angle(angle), axes, tolerance=1e-13, **options).energies)
+        for angle in angles
+    ]
+
+
+def test_twenty_angles_take_three_solves(walled):
+    angles = np.radians(np.linspace(1.0, 20.0, 20))
+    curve = dict(solve_angle_curve(walled, (0,), angles))
+    excess = np.array([curve[i].energies[0, 0] / e[0] - 1.0 for i, e in enumerate(energies(walled, angles, (0,)))])
+    assert sum(solution.snapshots == 0 for solution in curve.values()) <= 3
+    assert excess.max() <= 1e-8
+    assert excess.min() > -1e-12  # an upper bound of the discrete energy
+    reduced = [i for i in curve if curve[i].snapshots]
+    assert all(curve[i].certified and excess[i] <= curve[i].relative_energy_error for i in reduced)
+
+
+@pytest.mark.parametrize("method", ["chord", "arc"])
+def test_an_extreme_range_is_solved_in_full_more_often(method):
+    network, kappa = honeycomb()
+    angles = np.radians(np.geomspace(0.1, 59.0 if method == "arc" else 45.0, 12))
+    options = {"method": method, "conductivity": kappa, "contact_resistance": 0.01}
+    curve = dict(solve_angle_curve(network, (0, 1), angles, **options))
+    narrow = dict(solve_angle_curve(network, (0, 1), np.radians(np.geomspace(2.0, 4.0, 12)), **options))
+    full = [sum(solution.snapshots == 0 for solution in c.values()) for c in (curve, narrow)]
+    assert 12 > full[0] > full[1]
+    for index, exact in enumerate(energies(network, angles, (0, 1), **options)):
+        excess = np.diag(curve[index].energies) / exact - 1.0
+        assert excess.min() > -1e-12
+        assert excess.max() <= 1e-8
+
+
+def test_the_estimate_keeps_out_a_snapshot_that_is_too_far(monkeypatch):
+    network, kappa = honeycomb()
+    angles = np.radians([0.1, 45.0])
+    # without a contact resistance all elements of a honeycomb would change by one factor
+    options = {"conductivity": kappa, "contact_resistance": 0.1}
+    strict = dict(solve_angle_curve(network, (0, 1), angles, **options))
+    assert [strict[i].snapshots for i in (0, 1)] == [0, 0]
+    monkeypatch.setattr(angle_curve, "TOLERANCE", 1.0)
+    loose = dict(solve_angle_curve(network, (0, 1), angles, tolerance=1.0, **options))
+    (far,) = [i for i in (0, 1) if loose[i].snapshots]
+    error = np.diag(loose[far].energies) / energies(network, angles, (0, 1), **options)[far] - 1.0
+    assert 1e-6 < error.max() <= loose[far].relative_energy_error
+
+
+def test_the_whole_tensor_of_a_periodic_box():
+    network, kappa = honeycomb()
+    options = {"conductivity": kappa, "contact_resistance": 0.1}
+    angles = np.radians(np.linspace(3.0, 30.0, 8))
+    for angle, point in zip(angles, conductivity_curve(network, angles, **options), strict=True):
+        exact = effective_conductivity(network.with_half_angle(angle), **options, tolerance=1e-13).tensor
+        assert abs(exact[0, 1]) > 1e-4
+        np.testing.assert_allclose(point.tensor, exact, rtol=0.0, atol=1e-8 * exact.max())
+        np.testing.assert_array_equal(point.tensor, point.tensor.T)
+
+
+def test_large_systems_are_estimated_not_certified(monkeypatch):
+    from etc_engine.solvers import amg_cg, reduced_basis
+
+    monkeypatch.setattr(
+        reduced_basis, "build_preconditioner", lambda matrix: amg_cg.build_preconditioner(matrix, exact_level=100)
+    )
+    network = packed("uniform:0.01:0.02")
+    angles = np.radians(np.linspace(1.0, 20.0, 10))
+    curve = dict(solve_angle_curve(network, (0,), angles))
+    reduced = [i for i in curve if curve[i].snapshots]
+    assert len(reduced) >= 5
+    assert not any(curve[i].certified for i in reduced)
+    exact = energies(network, angles, (0,))
+    assert all(0.0 < curve[i].energies[0, 0] / exact[i][0] - 1.0 <= curve[i].relative_energy_error for i in reduced)
+
+
+@pytest.mark.parametrize("method", ["chord", "standard", "arc"])
+def test_the_ratio_of_elements_is_below_the_smallest_eigenvalue(walled, method):
+    modes = 3 if method == "arc" else 1
+    material = Material(np.ones(walled.packing.count), np.full(walled.count + walled.walls.size, 0.02))
+    wide, narrow = (
+        find_method(method).elements(contact_sides(walled.with_half_angle(angle)), material, modes)
+        for angle in np.radians([8.0, 2.0])
+    )
+    for one, other in ((wide, narrow), (narrow, wide)):
+        least = np.inf
+        for p in range(walled.packing.count):
+            n = one.offsets[p + 1] - one.offsets[p]
+            if n <= one.modes:
+                continue
+            rows = np.delete(np.arange(n), n - one.modes)  # one node grounded
+            a, b = (e.values[e.starts[p] : e.starts[p + 1]].reshape(n, n)[np.ix_(rows, rows)] for e in (one, other))
+            least = min(least, eigh(a, b, eigvals_only=True)[0])
+        assert 0.5 * least < smallest_ratio(one, other) <= least * (1.0 + 1e-9)
+
+
+def test_an_axis_that_nothing_spans_stays_zero():
+    row = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    network = bonded_contacts(row, 0.1)
+    points = conductivity_curve(network, [0.05, 0.1, 0.2, 0.3])
+    for angle, point in zip([0.05, 0.1, 0.2, 0.3], points, strict=True):
+        exact = effective_conductivity(network.with_half_angle(angle))
+        assert point.missing_axes == exact.missing_axes == "y"
+        np.testing.assert_allclose(point.tensor, exact.tensor, rtol=1e-9)
