@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -15,6 +15,7 @@ from etc_engine.dtem.methods import METHODS as DTEM_METHODS
 from etc_engine.effective import (
     CurvePoint,
     EffectiveConductivity,
+    conductivity_bounds,
     conductivity_curve,
     effective_conductivity,
     find_backbones,
@@ -126,6 +127,7 @@ class Cell:
     ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
     ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``solved_by`` is ``full``, or
     ``reduced`` where the conductivity comes from the solutions at other contact angles, ``snapshots`` of them.
+    ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each axis, of method ``exact`` only.
     """
 
     status: Status
@@ -141,6 +143,7 @@ class Cell:
     mean_field_conductivity: float = np.nan
     solved_by: str = ""
     snapshots: int = 0
+    conductivity_bounds: tuple[tuple[float, float], ...] = ()
 
 
 Cells = tuple[tuple[Cell, ...], ...]
@@ -211,14 +214,17 @@ def conduct_dtem(packing: ParticlePacking, spec: RealizationSpec, rng: np.random
         return _uniform(spec, Cell(Status.ERROR, str(error)))
     kappa = particle_conductivities(packing.count, spec.conduction, rng)
     networks = [network if angle is None else network.with_half_angle(angle) for angle in angles]
-    curve = _dtem_curve if _is_curve(spec) else _dtem_each
-    columns = [curve(networks, spec, backbones, kappa, method) for method in spec.conduction.methods]
+    columns = [
+        (_dtem_curve if _is_curve(spec, method) else _dtem_each)(networks, spec, backbones, kappa, method)
+        for method in spec.conduction.methods
+    ]
     return tuple(zip(*columns, strict=True))
 
 
-def _is_curve(spec: RealizationSpec) -> bool:
-    """Whether the half-angles are solved together."""
-    return spec.conduction.angle_curve == "reduced" and len(spec.contacts.contact_angles) >= CURVE_ANGLES
+def _is_curve(spec: RealizationSpec, method: str) -> bool:
+    """Whether the half-angles are solved together; ``exact`` wants every solution, for its bounds."""
+    enough = len(spec.contacts.contact_angles) >= CURVE_ANGLES
+    return enough and spec.conduction.angle_curve == "reduced" and method != "exact"
 
 
 def _dtem_each(
@@ -290,7 +296,15 @@ def _dtem_cell(
         return Cell(Status.NOT_CONVERGED, str(error))
     except EtcError as error:
         return Cell(Status.ERROR, str(error))
-    return _solved_cell(network, result, kappa, resistance, time.perf_counter() - start)
+    cell = _solved_cell(network, result, kappa, resistance, time.perf_counter() - start)
+    if method != "exact":
+        return cell
+    bounds = conductivity_bounds(result)
+    return replace(
+        cell,
+        conductivity_bounds=tuple((float(lower), float(upper)) for lower, upper in bounds),
+        solve_seconds=time.perf_counter() - start,
+    )
 
 
 def _solved_cell(

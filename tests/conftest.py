@@ -1,14 +1,20 @@
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from etc_engine.box import Box
 from etc_engine.cli import run
 from etc_engine.packing.particles import ParticlePacking
+
+# The same examples on every run; HYPOTHESIS_EXPLORE=1 looks for new ones.
+settings.register_profile("repeatable", derandomize=not os.environ.get("HYPOTHESIS_EXPLORE"), deadline=None)
+settings.load_profile("repeatable")
 
 DATA = Path(__file__).parent / "published" / "data"
 

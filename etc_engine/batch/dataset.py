@@ -66,6 +66,10 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (CELL + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
+    if "exact" in study.conduction.methods:
+        meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
+        dataset["conductivity_bounds"] = ((*CELL, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
+        dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
     for name, variable in CELL_VARIABLES.items():
         dataset[name] = (CELL, cells[name], variable.attributes)
     dataset["status"] = (CELL, cells["status"], _status_attributes())
@@ -114,6 +118,7 @@ def _cell_values(study: Study, table: Table) -> Values:
     shape = (len(study.densities), angles, methods, study.statistics.cap)
     values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in CELL_VARIABLES.items()}
     values["conductivity"] = np.full((*shape, d, d), np.nan)
+    values["conductivity_bounds"] = np.full((*shape, d, 2), np.nan)
     values["status"] = np.full(shape, Status.NOT_RUN, np.int8)
     for name, grid in values.items():
         grid[rows["density_index"], :, :, rows["realization"]] = rows[name]

@@ -94,6 +94,7 @@ def row_type(study: Study) -> np.dtype[Any]:
     fields += [(name, WORD if v.dtype is object else v.dtype) for name, v in UNIT_VARIABLES.items()]
     fields += [(name, WORD if v.dtype is object else v.dtype, cells) for name, v in CELL_VARIABLES.items()]
     fields += [("status", np.int8, cells), ("conductivity", np.float64, (*cells, d, d))]
+    fields += [("conductivity_bounds", np.float64, (*cells, d, 2))]
     return np.dtype(fields)
 
 
@@ -117,6 +118,10 @@ def tabulate(study: Study, records: Iterable[Record]) -> Table:
     rows["end_time"] = [record.end_time for record in records]
     for name in (*CELL_VARIABLES, "status", "conductivity"):
         rows[name] = [[[getattr(cell, name) for cell in row] for row in result.cells] for result in results]
+    unknown = np.full((study.box.dimension, 2), np.nan)
+    rows["conductivity_bounds"] = [
+        [[cell.conductivity_bounds or unknown for cell in row] for row in result.cells] for result in results
+    ]
     rows["conductivity"][rows["status"] > Status.NOT_PERCOLATING] = np.nan
     messages = {
         (int(i), int(r), a, m): cell.message

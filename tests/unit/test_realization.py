@@ -131,3 +131,13 @@ def test_a_mixture_is_met_to_the_nearest_particle_and_lies_between_its_materials
     ]
     assert k[0] == k[1] < k[2] < k[3]
     assert k[3] == pytest.approx(10.0 * k[0], rel=1e-9)
+
+
+def test_bounds_of_method_exact_are_in_its_cells():
+    small = PackingSpec("advancing-front", parse_radii("uniform:0.06:0.09"), Box((1.0, 1.0)))
+    spec = RealizationSpec(small, ContactSpec("bonded", (np.radians(5.0),)), ConductionSpec(methods=("chord", "exact")))
+    chord, exact = run(spec).cells[0]
+    assert chord.conductivity_bounds == ()
+    for axis, (lower, upper) in enumerate(exact.conductivity_bounds):
+        assert lower <= exact.conductivity[axis, axis] <= upper
+        assert upper - lower < 1e-5 * upper
