@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix
@@ -258,14 +259,14 @@ def _reduced(
     lift_flows, flows = flows[:, : space.loads], flows[:, space.loads :]
     for extra in range(MOST_CORRECTIONS + 1):
         try:
-            y = _solve_small(rows.T @ flows, -(rows.T @ lift_flows))
+            y = _solve_small(_inner(rows, flows), -_inner(rows, lift_flows))
         except np.linalg.LinAlgError:
             return None
-        q = lift_flows + flows @ y
-        energies = (space.lift + rows @ y).T @ q
+        q = lift_flows + _combine(flows, y)
+        energies = _inner(space.lift + _combine(rows, y), q)
         residual = -space.gather(q)
         scale = np.maximum(np.diag(energies), ROUND_OFF * np.einsum("ia,ia->a", space.lift, lift_flows))
-        if np.any(np.abs(space.conserved @ residual) > BALANCE * scale):
+        if np.any(np.abs(_inner(space.conserved[:, None], residual)) > BALANCE * scale):
             return None
         z = np.column_stack([reference.preconditioner.apply(r) for r in np.ascontiguousarray(residual.T)])
         error = float((np.maximum(np.einsum("ia,ia->a", residual, z), 0.0) / (mu * scale)).max())
@@ -275,7 +276,7 @@ def _reduced(
         added = space.rows(vectors[:, rows.shape[1] :])
         rows, flows = np.hstack([rows, added]), np.hstack([flows, member.apply(added)])
     seconds = time.perf_counter() - start
-    u = np.asarray(vectors @ y)
+    u = _combine(vectors, y)
     return FamilySolution(u, energies, error, reference.proven, basis.snapshots, 0, seconds)
 
 
@@ -314,7 +315,7 @@ def _full(
     t = space.lift + space.rows(u)
     solution = FamilySolution(
         u,
-        t.T @ member.apply(t),
+        _inner(t, member.apply(t)),
         max(report.relative_energy_error for report in reports),
         False,
         0,
@@ -326,13 +327,39 @@ def _full(
 
 def _orthonormal(basis: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """The basis with what the vectors add to it, by Gram-Schmidt done twice."""
-    columns = list(basis.T)
     for vector in vectors.T:
-        rest = vector / (np.linalg.norm(vector) or 1.0)
+        rest = vector[:, None] / (_length(vector[:, None]) or 1.0)
         for _ in range(2):
-            for column in columns:
-                rest = rest - (column @ rest) * column
-        length = float(np.linalg.norm(rest))
+            rest = rest - _combine(basis, _inner(basis, rest))
+        length = _length(rest)
         if length > DEPENDENT:
-            columns.append(rest / length)
-    return np.column_stack(columns) if columns else basis
+            basis = np.hstack([basis, rest / length])
+    return basis
+
+
+def _length(vector: NDArray[np.float64]) -> float:
+    return float(np.sqrt(_inner(vector, vector).item()))
+
+
+def _combine(columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The product of a tall and a small matrix, without BLAS, whose bits depend on the number of threads."""
+    return np.asarray(np.einsum("iq,qa->ia", columns, weights))
+
+
+def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inner products of the columns of two tall matrices, without BLAS."""
+    return np.asarray(_sum_products(np.ascontiguousarray(a), np.ascontiguousarray(b)))
+
+
+@njit(cache=True)
+def _sum_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sums over blocks of rows, then over the blocks, to keep round-off down."""
+    total, block = np.zeros((a.shape[1], b.shape[1])), np.zeros((a.shape[1], b.shape[1]))
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            for k in range(b.shape[1]):
+                block[j, k] += a[i, j] * b[i, k]
+        if i % 256 == 255:
+            total += block
+            block[:] = 0.0
+    return total + block

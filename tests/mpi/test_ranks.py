@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from etc_engine.batch.dataset import differing_variables, open_dataset
@@ -66,6 +67,27 @@ def test_the_same_bits_for_any_number_of_ranks(study, tmp_path):
     for count in (1, 2, 4):
         assert differing_variables(results[0], results[count]) == []
     assert len(set(results[4]["worker_rank"].values.ravel().tolist())) > 1  # the four did share the work
+
+
+@needs_mpi
+def test_contact_angle_curves_are_the_same_on_two_ranks_and_say_how_they_were_solved(study, tmp_path):
+    study.write_text(
+        STUDY.replace("[2.5, 5.0]", "[2.0, 4.0, 6.0, 8.0, 10.0, 12.0]")
+        .replace("0.01:0.02", "0.02:0.03")
+        .replace("[0.7, 0.6, 0.65, 0.75]", "0.75")
+        .replace('["chord", "arc"]', '"chord"')
+        .replace("realizations = 6", "realizations = 2")
+    )
+    results = []
+    for count in (0, 2):
+        output = tmp_path / f"curve{count}.nc"
+        done = ranks(count, "-m", "etc_engine", "sweep", str(study), "-o", str(output))
+        assert done.returncode == 0, done.stderr
+        results.append(open_dataset(output))
+    assert differing_variables(*results) == []
+    words, snapshots = (results[0][name].values for name in ("solved_by", "snapshots"))
+    assert set(words.ravel().tolist()) == {"full", "reduced"}
+    np.testing.assert_array_equal(snapshots > 0, words == "reduced")
 
 
 @needs_mpi

@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -140,3 +144,24 @@ def test_an_axis_that_nothing_spans_stays_zero():
         exact = effective_conductivity(network.with_half_angle(angle))
         assert point.missing_axes == exact.missing_axes == "y"
         np.testing.assert_allclose(point.tensor, exact.tensor, rtol=1e-9)
+
+
+def test_the_bits_do_not_depend_on_the_number_of_threads():
+    script = """
+import numpy as np
+from etc_engine import Box, PackingSpec, bonded_contacts, pack, parse_radii
+from etc_engine.dtem.angle_curve import solve_angle_curve
+spec = PackingSpec("advancing-front", parse_radii("uniform:0.01:0.02"), Box((1.0, 1.0)), radius_growth=False)
+network = bonded_contacts(pack(spec, np.random.default_rng(313)), 0.1)
+for index, solution in solve_angle_curve(network, (0,), [0.02, 0.05, 0.1, 0.15, 0.2]):
+    print(index, solution.snapshots, solution.energies.item().hex())
+"""
+    answers = []
+    for threads in ("1", "2"):
+        environment = os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), threads)
+        done = subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=True
+        )
+        answers.append(done.stdout)
+    assert answers[0] == answers[1]
+    assert len(answers[0].splitlines()) == 5

@@ -71,6 +71,11 @@ def test_without_density_the_packer_decides():
         ('"bonded"', '"overlap"', ("contacts", "contact_angle", "overlap")),
         ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded or coordination")),
         ("[statistics]", '[conduction]\nmethod = "cord"\n[statistics]', ("method", "found 'cord'", "chord")),
+        (
+            "[statistics]",
+            '[conduction]\nangle_curve = "some"\n[statistics]',
+            ("conduction.angle_curve", "found 'some'", "reduced or full"),
+        ),
         ("[statistics]", "[conduction]\nmethod = 5\n[statistics]", ("conduction.method", "found 5")),
         ("[statistics]", '[conduction]\nengine = "fem"\n[statistics]', ("conduction.engine", "found 'fem'", "dtem")),
         ("realizations = 3", "realizations = 0", ("statistics.realizations", "found 0", "at least 1")),
