@@ -353,13 +353,21 @@ def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
 
 @njit(cache=True)
 def _sum_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums over blocks of rows, then over the blocks, to keep round-off down."""
-    total, block = np.zeros((a.shape[1], b.shape[1])), np.zeros((a.shape[1], b.shape[1]))
-    for i in range(a.shape[0]):
+    """Sums over short blocks of rows, four at a time, then over the blocks: fast, and little round-off."""
+    rows = a.shape[0]
+    total = np.zeros((a.shape[1], b.shape[1]))
+    for first in range(0, rows, 256):
+        last = min(first + 256, rows)
+        even = last - (last - first) % 4
         for j in range(a.shape[1]):
             for k in range(b.shape[1]):
-                block[j, k] += a[i, j] * b[i, k]
-        if i % 256 == 255:
-            total += block
-            block[:] = 0.0
-    return total + block
+                s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+                for i in range(first, even, 4):
+                    s0 += a[i, j] * b[i, k]
+                    s1 += a[i + 1, j] * b[i + 1, k]
+                    s2 += a[i + 2, j] * b[i + 2, k]
+                    s3 += a[i + 3, j] * b[i + 3, k]
+                for i in range(even, last):
+                    s0 += a[i, j] * b[i, k]
+                total[j, k] += (s0 + s1) + (s2 + s3)
+    return total

@@ -151,7 +151,7 @@ def test_the_bits_do_not_depend_on_the_number_of_threads():
 import numpy as np
 from etc_engine import Box, PackingSpec, bonded_contacts, pack, parse_radii
 from etc_engine.dtem.angle_curve import solve_angle_curve
-spec = PackingSpec("advancing-front", parse_radii("uniform:0.01:0.02"), Box((1.0, 1.0)), radius_growth=False)
+spec = PackingSpec("advancing-front", parse_radii("uniform:0.006:0.012"), Box((1.0, 1.0)), radius_growth=False)
 network = bonded_contacts(pack(spec, np.random.default_rng(313)), 0.1)
 for index, solution in solve_angle_curve(network, (0,), [0.02, 0.05, 0.1, 0.15, 0.2]):
     print(index, solution.snapshots, solution.energies.item().hex())
