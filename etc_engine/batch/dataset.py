@@ -240,6 +240,8 @@ def open_dataset(path: Path) -> xarray.Dataset:
             dataset = stored.load()
     except OSError as error:
         raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
+    except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
+        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
     if "study_digest" not in dataset.attrs:
         raise OutputError(f"{path} is not the result of a sweep: it has no attribute study_digest")
     return dataset

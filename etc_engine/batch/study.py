@@ -99,6 +99,11 @@ class PackingTable(_Table):
             raise ValueError(f"method {self.method!r} is not available, allowed: {', '.join(PACKING_METHODS)}")
         if self.method == "advancing-front" and self.count is not None:
             raise ValueError("count has no meaning with method = 'advancing-front', which fills the box")
+        if self.method == "advancing-front" and self.periodic:
+            raise ValueError(
+                f"periodic: found {self.periodic!r}, 'advancing-front' fills a walled box; a periodic one takes "
+                "method = 'lubachevsky-stillinger'"
+            )
         if self.method == "advancing-front" and radii.scalable:
             raise ValueError(f"radii: found {self.radii!r}, 'advancing-front' needs a radius, such as 'equal:0.01'")
         if self.growth_rate is not None and self.method != "lubachevsky-stillinger":

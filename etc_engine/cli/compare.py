@@ -35,7 +35,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
 
     if output is not None:
         check_picture(output)
-        check_place(output)
+        check_place(output, result)
     dataset = open_dataset(result)
     comparison, fits = evaluate_models(dataset), fit_models(dataset)
     if output is not None:

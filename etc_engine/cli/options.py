@@ -60,13 +60,16 @@ def check_picture(path: Path) -> None:
         raise InputError("pictures need matplotlib: install the extra with pip install 'etc-engine[plot]'")
 
 
-def check_place(path: Path) -> None:
-    """Refuse an output that cannot be written, before the work begins.
+def check_place(path: Path, *inputs: Path) -> None:
+    """Refuse an output that cannot be written, or that is one of the inputs, before the work begins.
 
     Raises
     ------
     OutputError
     """
+    for source in inputs:
+        if path.exists() and source.exists() and path.samefile(source):
+            raise OutputError(f"the output {path} is the input itself: it would be lost, choose another name")
     with replacing(path, keep=False):
         pass
 

@@ -32,7 +32,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     from etc_engine.results.report import report_page
 
     check_picture(output.with_suffix(".png"))
-    check_place(output)
+    check_place(output, *results)
     datasets = [open_dataset(path) for path in results]
     dataset = datasets[0]
     comparison, systems = evaluate_models(dataset), system_sizes(datasets)

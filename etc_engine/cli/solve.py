@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from etc_engine.packing.files import ParticleTable
 
 
+BOND_GAP = 1e-6
+
+
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
 @click.option("--box", help="Edge lengths, such as 1,1; only for CSV.")
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
 )
-@click.option("--bond-gap", type=float, default=1e-6, show_default=True, help="Largest bonded gap, in mean radii.")
+@click.option("--bond-gap", type=float, default=BOND_GAP, show_default=True, help="Largest bonded gap, in mean radii.")
 @click.option(
     "--conductivity", type=float, help="Conductivity of the particles [W/(m K)]; 1 by default, or the file's column."
 )
@@ -37,7 +40,7 @@ if TYPE_CHECKING:
     type=float,
     default=0.0,
     show_default=True,
-    help="Resistance of a contact per unit thickness [m K/W].",
+    help="Resistance of every contact, walls included, per unit thickness [m K/W].",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with particles, contacts and fields.")
 @click.option("--vtk", type=click.Path(path_type=Path), help="VTK PolyData (.vtp) for ParaView.")
@@ -75,7 +78,9 @@ def solve_command(
     from etc_engine.errors import InputError
 
     outputs = _Outputs(output, vtk, plot)
-    outputs.check()
+    outputs.check(particles)
+    if contact_angle is None and bond_gap != BOND_GAP:
+        raise InputError("--bond-gap goes with --contact-angle, which is missing: overlaps have no gap")
     table = _read(particles, box, periodic, frame)
     if conductivity is not None and table.conductivity is not None:
         raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
@@ -95,6 +100,7 @@ def solve_command(
     field = recover_field(result.solutions[0])
     record = _record(network, method, result, field)
     _warn_of_close_arcs(method, result)
+    _warn_of_missing_contacts(network, contact_angle, bond_gap)
     _write(outputs, result, field, record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
@@ -131,8 +137,8 @@ class _Outputs:
     vtk: Path | None
     plot: Path | None
 
-    def check(self) -> None:
-        """Refuse what cannot be written before the work begins."""
+    def check(self, particles: Path) -> None:
+        """Refuse what cannot be written, or would replace the input, before the work begins."""
         from etc_engine.cli.options import check_picture, check_place
         from etc_engine.errors import InputError
 
@@ -142,7 +148,7 @@ class _Outputs:
             raise InputError(f"VTK PolyData is written to a .vtp file, found {str(self.vtk)!r}")
         for path in (self.netcdf, self.vtk, self.plot):
             if path is not None:
-                check_place(path)
+                check_place(path, particles)
 
 
 def _write(outputs: _Outputs, result: EffectiveConductivity, field: ParticleField, record: dict[str, Any]) -> None:
@@ -181,10 +187,30 @@ def _warn_of_close_arcs(method: str, result: EffectiveConductivity) -> None:
     close = count_close_arcs(result.solutions[0].sides)
     if method != "exact" and close:
         click.echo(
-            f"etc-engine: warning: {close} pairs of contacts on one particle are closer than the sum of their "
-            f"half-angles; {method} loses accuracy there, method exact does not",
+            f"etc-engine: warning: between {close} pairs of contact arcs of one particle the gap is less than the sum "
+            f"of their half-angles; {method} loses accuracy there, method exact does not",
             err=True,
         )
+
+
+def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | None, bond_gap: float) -> None:
+    """A packing without a single contact is most likely a misunderstanding about the contact rule."""
+    from etc_engine.packing.neighbors import neighbor_pairs
+
+    packing = network.packing
+    if network.count or packing.count < 2:
+        return
+    near = neighbor_pairs(packing, relative_gap=1.0)
+    if not near.count:
+        return
+    closest = float((near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))).min())
+    rule = "no particles overlap" if contact_angle is None else f"no surfaces are within {bond_gap:g} mean radii"
+    remedy = "touching particles conduct with --contact-angle" if contact_angle is None else "see --bond-gap"
+    click.echo(
+        f"etc-engine: warning: {rule}, so nothing conducts; the closest pair is {max(closest, 0.0):.2g} mean radii "
+        f"apart: {remedy}",
+        err=True,
+    )
 
 
 def _record(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from etc_engine.errors import EtcError
+from etc_engine.errors import EtcError, OutputError
 
 if TYPE_CHECKING:
     from etc_engine.batch.claim import Policy
@@ -34,6 +34,8 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")
+    if output.exists() and study.exists() and output.samefile(study):
+        raise OutputError(f"the output {output} is the study file itself: choose another name")
     policy: Policy = "resume" if resume else "overwrite" if overwrite else "fresh"
     return launch(study, output, policy, dry_run=dry_run)
 
@@ -98,7 +100,33 @@ def _tell(outcome: Outcome, seconds: float, ranks: int) -> None:
         f"rank{'s' * (ranks > 1)} in {seconds:.1f} s); cells: {cells}"
     )
     if outcome.failed:
-        click.echo(f"etc-engine: {outcome.failed} cells have no conductivity, see `message` in the file", err=True)
+        reason = _commonest_message(outcome.output, failed=True)
+        click.echo(
+            f"etc-engine: {outcome.failed} cells have no conductivity, most often: {reason} (`message` in the file)",
+            err=True,
+        )
+    elif {status.name for status, n in outcome.cells.items() if n} == {"NOT_PERCOLATING"}:
+        reason = _commonest_message(outcome.output, failed=False)
+        click.echo(
+            f"etc-engine: warning: no packing conducts ({reason}): see the density, and the rule and gap of [contacts]",
+            err=True,
+        )
+
+
+def _commonest_message(output: Path, *, failed: bool) -> str:
+    """What most cells of a result say, of those that failed or of those without a path."""
+    from collections import Counter
+
+    from etc_engine.batch.dataset import open_dataset
+    from etc_engine.realization import Status
+
+    dataset = open_dataset(output)
+    status = dataset["status"].values.ravel()
+    wanted = (
+        (status > Status.NOT_PERCOLATING) & (status < Status.NOT_RUN) if failed else status == Status.NOT_PERCOLATING
+    )
+    messages = Counter(str(text) for text, flag in zip(dataset["message"].values.ravel(), wanted, strict=True) if flag)
+    return messages.most_common(1)[0][0] if messages else "no reason given"
 
 
 def _foretell(study: Path, output: Path, communicator: Communicator, realize: Realize) -> int:
