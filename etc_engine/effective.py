@@ -225,7 +225,7 @@ def conductivity_curve(
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
     >>> points = conductivity_curve(bonded_contacts(disk, 0.1), [0.05, 0.1, 0.2])
-    >>> [round(point.tensor[0, 0], 6) for point in points]
+    >>> [round(float(point.tensor[0, 0]), 6) for point in points]
     [0.359798, 0.429685, 0.53673]
     """
     box = network.packing.box

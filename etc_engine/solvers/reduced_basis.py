@@ -265,7 +265,8 @@ def _reduced(
         q = lift_flows + _combine(flows, y)
         energies = _inner(space.lift + _combine(rows, y), q)
         residual = -space.gather(q)
-        scale = np.maximum(np.diag(energies), ROUND_OFF * np.einsum("ia,ia->a", space.lift, lift_flows))
+        lift_energies = np.einsum("ia,ia->a", space.lift, lift_flows)
+        scale = np.maximum(np.diag(energies), max(ROUND_OFF * lift_energies.max(), np.finfo(np.float64).tiny))
         if np.any(np.abs(_inner(space.conserved[:, None], residual)) > BALANCE * scale):
             return None
         z = np.column_stack([reference.preconditioner.apply(r) for r in np.ascontiguousarray(residual.T)])
@@ -305,13 +306,16 @@ def _full(
             np.ascontiguousarray(rhs[:, a]),
             float(space.lift[:, a] @ flows[:, a]),
             preconditioner=preconditioner,
-            initial=None if nearby is None else np.ascontiguousarray(nearby.u[:, a]),
+            initial=None if nearby is None or not rhs[:, a].any() else np.ascontiguousarray(nearby.u[:, a]),
             tolerance=tolerance,
             spectral_floor=None if reference is None else reference.mu * member.floor(reference.member),
         )
         reports.append(report)
     if reference is None:
-        reference = _Reference(member, preconditioner, 0.5 * min(report.smallest_ritz for report in reports))
+        # without iterations there is no Ritz value; that of a factorisation is 1
+        ritz = [report.smallest_ritz for report in reports if report.iterations]
+        unknown = 1.0 if preconditioner.levels == 1 else np.nan
+        reference = _Reference(member, preconditioner, 0.5 * min(ritz, default=unknown))
     t = space.lift + space.rows(u)
     solution = FamilySolution(
         u,

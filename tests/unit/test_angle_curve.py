@@ -146,6 +146,20 @@ def test_an_axis_that_nothing_spans_stays_zero():
         np.testing.assert_allclose(point.tensor, exact.tensor, rtol=1e-9)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_load_that_drives_nothing_has_no_energy(axis):
+    """A row of disks around a periodic box conducts along one axis only."""
+    centers = np.full((4, 2), 0.5)
+    centers[:, axis] = 0.125 + 0.25 * np.arange(4)
+    chain = ParticlePacking(centers, np.full(4, 0.125), Box((1.0, 1.0), (True, True)))
+    network, kappa = bonded_contacts(chain, 0.1), np.array([1.0, 2.0, 0.5, 3.0])
+    angles = [0.05, 0.1, 0.2, 0.3, 0.4]
+    for angle, point in zip(angles, conductivity_curve(network, angles, conductivity=kappa), strict=True):
+        exact = effective_conductivity(network.with_half_angle(angle), conductivity=kappa)
+        assert point.missing_axes == exact.missing_axes != ""
+        np.testing.assert_allclose(point.tensor, exact.tensor, rtol=1e-8, atol=1e-12)
+
+
 def test_the_bits_do_not_depend_on_the_number_of_threads():
     script = """
 import numpy as np
