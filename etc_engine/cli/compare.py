@@ -32,12 +32,15 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     from etc_engine.batch.dataset import open_dataset
     from etc_engine.cli.options import check_picture, check_place, print_json, replacing
     from etc_engine.comparison import evaluate_models, fit_models, model_lines
+    from etc_engine.errors import InputError
 
     if output is not None:
         check_picture(output)
         check_place(output, result)
     dataset = open_dataset(result)
     comparison, fits = evaluate_models(dataset), fit_models(dataset)
+    if not (dataset["count"] > 0).any():
+        raise InputError(f"{result} has no cell with a conductivity to compare: see `etc-engine info` and `message`")
     if output is not None:
         from etc_engine.figures import save_comparison
 
@@ -48,7 +51,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     else:
         _print_head(result, comparison)
         _print_table(comparison)
-        _print_notes(comparison)
+        _print_notes(comparison, int(((dataset["status"] > 1) & (dataset["status"] < 5)).sum()))
         _print_fits(fits)
         if output is not None:
             click.echo(f"figure: {output}")
@@ -170,7 +173,7 @@ def _model_words(one: xarray.Dataset) -> str:
     return f"{mark}{value:.4f} " + ("      -" if math.isnan(difference) else f"{100 * difference:+6.1f}%")
 
 
-def _print_notes(comparison: xarray.Dataset) -> None:
+def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
     click.echo()
     notes = dict(zip(comparison["model"].values.tolist(), comparison["model_note"].values.tolist(), strict=True))
     zero = [name for name, note in notes.items() if note.startswith("is 0")]
@@ -179,6 +182,10 @@ def _print_notes(comparison: xarray.Dataset) -> None:
     for name, note in notes.items():
         if note and name not in zero:
             click.echo(f"{name}: {note}")
+    if failed:
+        click.echo(
+            f"{failed} cells failed and stay out of the means (status 2 to 4, reasons in `message`): a selection"
+        )
     if not comparison.attrs["bounds_bind"]:
         click.echo("bounds: a comparison only; Hashin-Shtrikman bounds bind overlapping geometries, not bonded ones")
     elif comparison.attrs["bound_broken"]:
@@ -202,7 +209,10 @@ def _print_fits(fits: tuple[Fit, ...]) -> None:
             reasons.setdefault(f"no fit of {fit.model}: {fit.note}", where)
             continue
         constants = ", ".join(f"{p.name} {p.value:.4g} [{p.low:.4g}, {p.high:.4g}]" for p in fit.parameters)
-        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {constants}")
+        # an interval wider than twice the value says that the data leave the constant open
+        loose = [p.name for p in fit.parameters if p.high - p.low > 2.0 * abs(p.value)]
+        doubt = f" (not determined by these densities: {', '.join(loose)})" if loose else ""
+        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {constants}{doubt}")
     for reason in reasons:
         click.echo(reason)
 

@@ -159,3 +159,24 @@ def test_without_matplotlib_the_table_is_there_and_a_figure_is_refused(bonded):
     assert refused.returncode == 2
     assert len(refused.stderr.splitlines()) == 1
     assert "pictures need matplotlib" in refused.stderr
+
+
+@pytest.mark.parametrize("place", [600, 6000, 12000, 20000])
+def test_a_damaged_result_is_one_line(etc_engine, tmp_path, bonded, place):
+    path = tmp_path / "bad.nc"
+    data = bytearray(bonded.read_bytes())
+    data[place : place + 4000] = b"\xff" * len(data[place : place + 4000])
+    path.write_bytes(data)
+    for command in ("compare", "info"):
+        done = etc_engine(command, path)
+        assert done.returncode in (0, 2)  # what was overwritten may be padding
+        assert "unexpected" not in done.stderr
+
+
+def test_compare_and_report_never_replace_their_input(etc_engine, tmp_path):
+    path = tmp_path / "out.png"
+    path.write_bytes(b"x")
+    for command in ("compare", "report"):
+        done = etc_engine(command, path, "-o", path)
+        assert done.returncode == 2
+        assert "is the input itself" in done.stderr

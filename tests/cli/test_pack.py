@@ -223,3 +223,10 @@ def test_vtk_files_without_vtk_are_refused_before_the_work(pack, tmp_path, monke
     assert done.returncode == 2
     assert "install the extra with pip install 'etc-engine[vtk]'" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_grown_radii_are_said(pack, tmp_path):
+    done = pack("--radii", "equal:0.05", "--box", "1,1", "--density", 0.95, "--seed", 81, "-o", tmp_path / "a.csv")
+    assert done.returncode == 0
+    assert "radii were grown" in done.stderr
+    assert pack(*SMALL, "--density", 0.7, "--seed", 81, "-o", tmp_path / "b.csv").stderr == ""

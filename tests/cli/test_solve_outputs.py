@@ -127,3 +127,31 @@ def test_close_arcs_are_warned_of(etc_engine, tmp_path):
     assert done.returncode == 0
     assert "method exact" in done.stderr
     assert json.loads(done.stdout)["conductivity"] == pytest.approx(0.94114, abs=1e-5)
+
+
+@pytest.mark.parametrize("option", ["-o", "--plot"])
+def test_an_output_never_replaces_its_input(etc_engine, tmp_path, option):
+    name = tmp_path / ("disks.png" if option == "--plot" else "disks.csv")
+    name.write_text("x,y,radius\n0.25,0.5,0.25\n0.75,0.5,0.25\n")
+    before = name.read_bytes()
+    done = etc_engine("solve", name, "--box", "1,1", "--contact-angle", 5, option, name)
+    assert done.returncode == 2
+    assert "is the input itself" in done.stderr
+    assert name.read_bytes() == before
+
+
+def test_nothing_in_contact_is_said(etc_engine, tmp_path):
+    path = tmp_path / "disks.csv"
+    path.write_text("x,y,radius\n0.25,0.5,0.2\n0.75,0.5,0.2\n")
+    done = etc_engine("solve", path, "--box", "1,1", "--json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["conductivity"] == 0.0
+    assert "no particles overlap" in done.stderr
+    assert "0.5 mean radii" in done.stderr
+    assert "--bond-gap" in etc_engine("solve", path, "--box", "1,1", "--contact-angle", 5).stderr
+
+
+def test_a_bond_gap_without_bonds_is_refused(etc_engine):
+    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--bond-gap", 0.1)
+    assert done.returncode == 2
+    assert "goes with --contact-angle" in done.stderr
