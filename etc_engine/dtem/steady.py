@@ -139,7 +139,7 @@ def solve_steady(
         check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), driven)))
     elements = variant.elements(sides, replace(material, contact_resistance=material.contact_resistance[kept]), modes)
     system = assemble(elements, *prescribe(reduced, axes, backbone, sides, elements.modes))
-    u, reports = _solve(system, tolerance)
+    u, reports = _solve(system, elements.modes, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
     return SteadySolution(
@@ -190,12 +190,14 @@ def prescribe(
     return lift.reshape(-1, len(axes)), prescribed.ravel()
 
 
-def _solve(system: LinearSystem, tolerance: float) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
+def _solve(system: LinearSystem, modes: int, tolerance: float) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
+    """Free temperatures of all loads; a uniform temperature lives on mode 0 alone."""
     if system.matrix.shape[0] == 0:  # every node is a wall or pinned
         return np.zeros(system.rhs.shape), tuple(
             SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0) for _ in system.lift_energies
         )
     preconditioner = build_preconditioner(system.matrix)
+    uniform = (np.flatnonzero(system.free >= 0) % modes == 0).astype(np.float64)
     u = np.empty(system.rhs.shape)
     reports = []
     for load, lift_energy in enumerate(system.lift_energies):
@@ -205,6 +207,7 @@ def _solve(system: LinearSystem, tolerance: float) -> tuple[NDArray[np.float64],
             float(lift_energy),
             preconditioner=preconditioner,
             tolerance=tolerance,
+            conserved=uniform,
         )
         reports.append(report)
     return u, tuple(reports)

@@ -308,6 +308,7 @@ def _full(
             preconditioner=preconditioner,
             initial=None if nearby is None or not rhs[:, a].any() else np.ascontiguousarray(nearby.u[:, a]),
             tolerance=tolerance,
+            conserved=space.conserved,
             spectral_floor=None if reference is None else reference.mu * member.floor(reference.member),
         )
         reports.append(report)

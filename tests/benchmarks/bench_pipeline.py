@@ -35,10 +35,11 @@ def measure(count: int, direct: bool, stock: bool) -> dict:
     """Seconds and peak memory after each stage for about ``count`` disks between walls."""
     from etc_engine.box import Box
     from etc_engine.contacts import bonded_contacts
+    from etc_engine.dtem.assembly import assemble
     from etc_engine.dtem.element import Material
     from etc_engine.dtem.methods import METHODS
     from etc_engine.dtem.sides import contact_sides
-    from etc_engine.dtem.steady import _load
+    from etc_engine.dtem.steady import prescribe
     from etc_engine.packing import PackingSpec, pack, parse_radii
     from etc_engine.percolation import find_backbone
     from etc_engine.solvers import build_preconditioner, solve_energy
@@ -61,11 +62,12 @@ def measure(count: int, direct: bool, stock: bool) -> dict:
     sides = timed("sides", lambda: contact_sides(reduced))
     material = Material(np.ones(packing.count), np.zeros(reduced.count + reduced.walls.size))
     elements = timed("elements", lambda: METHODS["chord"].elements(sides, material))
-    system = timed("assemble", lambda: _load(reduced, (0,), backbone, sides, elements))
+    loads = prescribe(reduced, (0,), backbone, sides, elements.modes)
+    system = timed("assemble", lambda: assemble(elements, *loads))
     preconditioner = timed("set-up", lambda: build_preconditioner(system.matrix))
     rhs, lift = np.ascontiguousarray(system.rhs[:, 0]), float(system.lift_energies[0])
     u, report = timed("solve", lambda: solve_energy(system.matrix, rhs, lift, preconditioner=preconditioner))
-    energy = lift - float(u @ rhs)
+    energy = lift - float(u @ (2.0 * rhs - system.matrix @ u))
     out = {
         "disks": packing.count,
         "unknowns": system.matrix.shape[0],

@@ -105,3 +105,19 @@ def test_indefinite_matrix_raises():
     matrix = csr_matrix(np.diag([1.0, -1.0, 2.0]))
     with pytest.raises(ConvergenceError, match="not positive definite"):
         solve_energy(matrix, np.array([1.0, 5.0, 1.0]), 10.0)
+
+
+def test_heat_balances_to_round_off_and_the_correction_lowers_the_error():
+    matrix = grid_laplacian(60, 83)
+    rhs = np.random.default_rng(84).normal(size=matrix.shape[0])
+    exact = spsolve(matrix.tocsc(), rhs)
+    energy = 2.0 * float(rhs @ exact)
+    u, report = solve_energy(
+        matrix, rhs, energy, preconditioner=build_preconditioner(matrix, 100), tolerance=1e-6, balance_tolerance=1.0
+    )
+    assert abs((rhs - matrix @ u).sum()) < 1e-11 * energy
+    assert report.imbalance < 1e-11
+    error = float((u - exact) @ (matrix @ (u - exact)))
+    for shift in (-1e-3, 1e-3):  # the best of all uniform shifts
+        other = u - exact + shift
+        assert float(other @ (matrix @ other)) > error
