@@ -24,6 +24,7 @@ from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
 from etc_engine.errors import ConvergenceError
+from etc_engine.solvers.aggregation import aggregation_hierarchy
 
 # Below this many unknowns one sparse factorisation is faster than a multigrid hierarchy.
 EXACT_LEVEL = 20_000
@@ -99,26 +100,13 @@ def build_preconditioner(matrix: csr_matrix, exact_level: int = EXACT_LEVEL) -> 
 
     Notes
     -----
-    Symmetric strength of connection (threshold 0.08), locally weighted Jacobi prolongator smoothing, one forward
-    Gauss-Seidel sweep before and one backward sweep after the coarse correction: nothing draws on a random state,
-    so two builds agree bit for bit.
+    Nothing draws on a random state, so two builds agree bit for bit; see `aggregation_hierarchy`.
     """
     start = time.perf_counter()
     if matrix.shape[0] <= exact_level:
         apply, levels = _factorise(matrix), 1
     else:
-        from pyamg import smoothed_aggregation_solver
-
-        hierarchy = smoothed_aggregation_solver(
-            matrix.sorted_indices(),  # aggregates follow the order of the columns
-            strength=("symmetric", {"theta": 0.08}),
-            smooth=("jacobi", {"weighting": "local"}),
-            improve_candidates=None,
-            max_coarse=500,
-            coarse_solver="splu",
-            presmoother=("gauss_seidel", {"sweep": "forward"}),
-            postsmoother=("gauss_seidel", {"sweep": "backward"}),  # the mirror image: the cycle stays symmetric
-        )
+        hierarchy = aggregation_hierarchy(matrix)
         apply, levels = hierarchy.aspreconditioner(cycle="V").matvec, len(hierarchy.levels)
     return Preconditioner(apply, levels, time.perf_counter() - start)
 

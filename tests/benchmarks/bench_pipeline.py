@@ -2,7 +2,7 @@
 
 Run by hand: ``python tests/benchmarks/bench_pipeline.py [--largest 1e6] [--direct 1e5] [--stock]``. Every size runs
 in a process of its own, so that the peak memory after each stage is that of this size; kernels are warmed up first.
-``--stock`` adds PyAMG's stock Ruge-Stueben CG to a residual of 1e-10.
+``--stock`` adds PyAMG's stock Ruge-Stueben CG to a residual of 1e-10, and MKL PARDISO where pypardiso is installed.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import resource
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(name, "1")
@@ -93,6 +94,10 @@ def measure(count: int, direct: bool, stock: bool) -> dict:
 
         out["stock_setup"], solver = time_of(lambda: pyamg.ruge_stuben_solver(system.matrix))
         out["stock_solve"], _ = time_of(lambda: solver.solve(rhs, tol=1e-10, accel="cg"))
+        if find_spec("pypardiso"):
+            import pypardiso
+
+            out["pardiso"], _ = time_of(lambda: pypardiso.spsolve(system.matrix, rhs))
     return out
 
 
@@ -117,7 +122,10 @@ def main() -> None:
         print(json.dumps(measure(arguments.child, arguments.child <= arguments.direct, arguments.stock)))
         return
     sizes = [n for n in (10**3, 10**4, 10**5, 10**6) if n <= arguments.largest]
-    print("seconds" + "".join(f"{stage:>10s}" for stage in ("disks", *STAGES, "iter", "splu", "to 1e-8", "stock RS")))
+    print(
+        "seconds"
+        + "".join(f"{stage:>10s}" for stage in ("disks", *STAGES, "iter", "splu", "to 1e-8", "stock RS", "PARDISO"))
+    )
     rows = []
     for size in sizes:
         command = [sys.executable, __file__, "--child", str(size), "--direct", str(arguments.direct)]
@@ -128,7 +136,7 @@ def main() -> None:
         rows.append(row)
         stock = row.get("stock_setup", np.nan) + row.get("stock_solve", np.nan)
         numbers = [row["seconds"][stage] for stage in STAGES]
-        tail = [row.get("splu", np.nan), row["seconds"]["set-up"] + row["to_1e-8"], stock]
+        tail = [row.get("splu", np.nan), row["seconds"]["set-up"] + row["to_1e-8"], stock, row.get("pardiso", np.nan)]
         print(
             f"       {row['disks']:>10d}"
             + "".join(f"{value:10.4f}" for value in numbers)

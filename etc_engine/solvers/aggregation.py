@@ -1,0 +1,90 @@
+"""Smoothed-aggregation hierarchy on plain CSR matrices, out of PyAMG's parts.
+
+PyAMG's own set-up keeps prolongators as block matrices of 1 x 1 blocks; sorting those takes more than half of its
+time on contact networks, and the cycle runs slower on them too. The mathematics here is the same.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+STRENGTH = 0.08
+"""Entries below this part of the geometric mean of their diagonals do not aggregate."""
+DAMPING = 4.0 / 3.0
+"""Damping of the Jacobi sweep that smooths a prolongator, relative to the absolute row sum."""
+COARSEST = 500
+"""The coarsest level is factorised."""
+MOST_LEVELS = 20
+
+
+def aggregation_hierarchy(matrix: csr_matrix) -> Any:
+    """A `pyamg.MultilevelSolver` for a symmetric positive definite matrix.
+
+    Aggregates of strongly connected unknowns carry the constant; the prolongator is smoothed by one Jacobi sweep,
+    P = (I - w D^-1 A) T with D the absolute row sums; coarse matrices are P^T A P. One forward Gauss-Seidel sweep
+    goes before the coarse correction and one backward sweep after it, so that the V-cycle is symmetric.
+
+    Parameters
+    ----------
+    matrix : csr_matrix, shape (n, n)
+
+    Returns
+    -------
+    pyamg.multilevel.MultilevelSolver
+
+    Notes
+    -----
+    Nothing draws on a random state: two builds agree bit for bit.
+
+    References
+    ----------
+    Vanek, Mandel, Brezina 1996, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
+    problems, Computing 56, doi:10.1007/BF02238511.
+    """
+    from pyamg.multilevel import MultilevelSolver
+    from pyamg.relaxation.smoothing import change_smoothers
+
+    levels = []
+    current, near_kernel = matrix.sorted_indices(), np.ones(matrix.shape[0])  # aggregates follow the order of columns
+    while True:
+        level = MultilevelSolver.Level()
+        level.A = current
+        levels.append(level)
+        if current.shape[0] <= COARSEST or len(levels) == MOST_LEVELS:
+            break
+        tentative, coarse_kernel = _tentative(current, near_kernel)
+        if tentative.shape[1] >= current.shape[0]:
+            break  # nothing aggregates any more
+        near_kernel = coarse_kernel
+        level.P = _smoothed(current, tentative)
+        level.R = level.P.T.tocsr()
+        current = csr_matrix(level.R @ (current @ level.P)).sorted_indices()
+    hierarchy = MultilevelSolver(levels, coarse_solver="splu")
+    change_smoothers(hierarchy, ("gauss_seidel", {"sweep": "forward"}), ("gauss_seidel", {"sweep": "backward"}))
+    return hierarchy
+
+
+def _tentative(matrix: csr_matrix, near_kernel: NDArray[np.float64]) -> tuple[csr_matrix, NDArray[np.float64]]:
+    """Prolongator of orthonormal columns, one an aggregate, that carries the near kernel, and that of its level."""
+    from pyamg.aggregation.aggregate import standard_aggregation
+    from pyamg.strength import symmetric_strength_of_connection
+
+    aggregates = standard_aggregation(symmetric_strength_of_connection(matrix, theta=STRENGTH))[0].tocsr()
+    values = near_kernel[np.repeat(np.arange(matrix.shape[0]), np.diff(aggregates.indptr))]
+    norms = np.sqrt(np.bincount(aggregates.indices, values**2, minlength=aggregates.shape[1]))
+    tentative = csr_matrix(
+        (values / norms[aggregates.indices], aggregates.indices, aggregates.indptr), aggregates.shape
+    )
+    return tentative, norms
+
+
+def _smoothed(matrix: csr_matrix, tentative: csr_matrix) -> csr_matrix:
+    """One damped Jacobi sweep on every column."""
+    correction = csr_matrix(matrix @ tentative)
+    rows = np.asarray(abs(matrix).sum(axis=1)).ravel()
+    correction.data *= np.repeat(DAMPING / rows, np.diff(correction.indptr))
+    return csr_matrix(tentative - correction)
