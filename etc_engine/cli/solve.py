@@ -158,10 +158,13 @@ def _write(outputs: _Outputs, result: EffectiveConductivity, field: ParticleFiel
     solution = result.solutions[0]
     with ExitStack() as files:
         if outputs.netcdf is not None:
+            from etc_engine.batch.provenance import engine_version
             from etc_engine.results.single import solve_dataset
 
             plain = {key: value for key, value in record.items() if key != "contact_temperatures"}
             plain["percolates"] = int(plain["percolates"])
+            plain["conductivity_units"] = "W m-1 K-1"
+            plain["source"] = f"etc_engine {engine_version()}"
             if "conductivity_tensor" in plain:
                 plain["conductivity_tensor"] = plain["conductivity_tensor"].ravel()
             plain["command"] = " ".join(["etc-engine", *sys.argv[1:]])

@@ -36,6 +36,10 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
         raise click.UsageError("--resume and --overwrite exclude each other")
     if output.exists() and study.exists() and output.samefile(study):
         raise OutputError(f"the output {output} is the study file itself: choose another name")
+    if dry_run:
+        from etc_engine.cli.options import check_place  # loads numpy
+
+        check_place(output)
     policy: Policy = "resume" if resume else "overwrite" if overwrite else "fresh"
     return launch(study, output, policy, dry_run=dry_run)
 

@@ -66,5 +66,8 @@ def solve_dataset(solution: SteadySolution, field: ParticleField, attributes: Ma
         "periodic": box.periodic_axes,
         "method": solution.method,
         "load_axis": "xy"[solution.axes[0]],
+        "load": "mean temperature gradient of 1 K/m"
+        if box.periodic[solution.axes[0]]
+        else "temperature 1 K at the low wall, 0 K at the far wall",
     }
     return xarray.Dataset(variables, attrs=general | dict(attributes))
