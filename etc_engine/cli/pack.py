@@ -116,7 +116,7 @@ def pack_command(
         "seconds": seconds,
         "seed": seed,
     }
-    if "advancing" in method and density is not None:
+    if method == "advancing-front" and density is not None:
         _warn_of_growth(packing, density)
     if as_json:
         print_json(record)

@@ -90,6 +90,19 @@ def _quadrature(modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 @njit(cache=True)
+def _project(kernel: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Moments of a kernel at the Gauss points over the modes of both arcs."""
+    modes, number = weights.shape
+    for k in range(modes):
+        for l in range(modes):
+            value = 0.0
+            for u in range(number):
+                for v in range(number):
+                    value += weights[k, u] * weights[l, v] * kernel[u, v]
+            out[k, l] = value
+
+
+@njit(cache=True)
 def _block(
     separation: float,
     a: float,
@@ -100,17 +113,11 @@ def _block(
     out: NDArray[np.float64],
 ) -> None:
     """Kappa H over the modes of two different arcs."""
-    modes, number = weights.shape
+    number = points.size
     for u in range(number):
         for v in range(number):
             kernel[u, v] = -np.log(abs(np.sin(0.5 * (separation + a * points[u] - b * points[v])))) / np.pi
-    for k in range(modes):
-        for l in range(modes):
-            value = 0.0
-            for u in range(number):
-                for v in range(number):
-                    value += weights[k, u] * weights[l, v] * kernel[u, v]
-            out[k, l] = value
+    _project(kernel, weights, out)
 
 
 @njit(cache=True)
@@ -122,19 +129,14 @@ def _own_block(
     out: NDArray[np.float64],
 ) -> None:
     """Kappa H over the modes of one arc."""
-    modes, number = weights.shape
+    number = points.size
     for u in range(number):
         for v in range(number):
             x = 0.5 * a * (points[u] - points[v])
             ratio = 1.0 if u == v else np.sin(x) / x
             kernel[u, v] = -np.log(0.5 * a * ratio) / np.pi
-    for k in range(modes):
-        for l in range(modes):
-            value = 0.0
-            for u in range(number):
-                for v in range(number):
-                    value += weights[k, u] * weights[l, v] * kernel[u, v]
-            out[k, l] = value
+    _project(kernel, weights, out)
+    for k in range(weights.shape[0]):
         out[k, k] += (np.log(2.0) if k == 0 else 0.5 / k) / np.pi
 
 
