@@ -15,11 +15,8 @@ pytestmark = [pytest.mark.skipif(bool(MISSING), reason=MISSING), pytest.mark.slo
 FITS = "return document.documentElement.scrollWidth <= innerWidth"
 BANDS = "return [...document.querySelectorAll('path.band')].map(p => p.getBoundingClientRect().width)"
 CONTROLS = "input, select, textarea, button, a, svg[role], progress"
-UNNAMED = (
-    f"return [...document.querySelectorAll('{CONTROLS}')]"
-    + """.filter(e => e.offsetParent !== null && !(e.labels && e.labels.length) && !e.getAttribute('aria-label') && !e.innerText
-    ).map(e => e.outerHTML)"""
-)
+UNNAMED = """return [...document.querySelectorAll(arguments[0])].filter(e => e.offsetParent !== null &&
+    !(e.labels && e.labels.length) && !e.getAttribute('aria-label') && !e.innerText).map(e => e.outerHTML)"""
 CONTRAST = """
 const light = c => { const [r, g, b] = c.match(/[0-9.]+/g).slice(0, 3).map(v => (v /= 255) <= .03928 ? v / 12.92
     : ((v + .055) / 1.055) ** 2.4); return .2126 * r + .7152 * g + .0722 * b };
@@ -99,7 +96,7 @@ def test_nothing_hangs_over_and_everything_has_a_name(slow, browser, width, sche
         browser.find(sign)
         browser.run("document.querySelectorAll('details').forEach(d => d.open = true)")
         assert browser.run(FITS), part
-        assert browser.run(UNNAMED) == [], part
+        assert browser.run(UNNAMED, CONTROLS) == [], part
         assert browser.run(CONTRAST) == [], part
     browser.resize(1280, 900)
     browser.prefer("light")
@@ -109,9 +106,8 @@ def test_a_pasted_study_is_refused_then_taken_and_cancelled(slow, browser):
     browser.open(slow.url)
     browser.click("#tab-text")
     assert 'radii = "uniform:0.01:0.02"' in browser.run("return document.getElementById('study-text').value")
-    paste = (
-        "const t = document.getElementById('study-text'); t.value = arguments[0]; t.dispatchEvent(new Event('input'))"
-    )
+    paste = "const t = arguments[1]; t.value = arguments[0]; t.dispatchEvent(new Event('input'))"
+    area = {ELEMENT: browser.find("#study-text")}
     text = renamed("pasted <b>bold</b>").replace("realizations = 3", "realizations = 40")
     browser.run(paste, text.replace("[packing]", "[packin]"), area)
     assert "did you mean 'packing'" in browser.until("return document.getElementById('study-error').innerText")

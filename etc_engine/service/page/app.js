@@ -390,7 +390,9 @@ function solve() {
 }
 
 async function models() {
+  const mine = view;
   if (!catalogue) catalogue = (await get("/api/models")).models;
+  if (mine !== view) return; // somebody has gone on to another part meanwhile
   const select = h("select", { id: "model" }, catalogue.map(model => h("option", { value: model.model }, model.title)));
   const detail = h("div");
   function fill() {
@@ -463,6 +465,6 @@ async function start() {
   ticking = setTimeout(tick, 1000 * BUSY_SECONDS);
 }
 
-addEventListener("hashchange", () => { if (about) route().then(() => $("main").focus()); });
+addEventListener("hashchange", () => { $("main").focus(); if (about) route(); });
 addEventListener("visibilitychange", () => { if (!document.hidden && about) tick(); });
 start();
