@@ -87,8 +87,15 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
     if state_folder(wanted.output).exists() and not (wanted.resume or wanted.overwrite):
         raise OutputError(f"{state_folder(wanted.output)} holds states of a former run: give --resume or --overwrite")
     study = parse_study(content)
-    with PackingProgress("marching") as progress:
-        done = run_transient(study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report)
+    try:
+        with PackingProgress("marching") as progress:
+            done = run_transient(
+                study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report
+            )
+    except InputError:
+        if not wanted.resume:  # what was refused leaves nothing behind
+            remove_states(wanted.output)
+        raise
     if done.stopped:
         click.echo(
             f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {len(study.time.times)} states are "

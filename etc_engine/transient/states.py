@@ -58,7 +58,7 @@ def read_states(folder: Path) -> list[MarchState]:
     states: list[MarchState] = []
     while (path := state_path(folder, len(states))).exists():
         try:
-            with np.load(path) as data:
+            with np.load(BytesIO(path.read_bytes())) as data:
                 values = {name: data[name] for name in FIELDS}
         except (OSError, ValueError, KeyError, zipfile.BadZipFile):
             break

@@ -218,7 +218,9 @@ def parse_study(content: Mapping[str, Any]) -> NetworkStudy:
     try:
         return NetworkStudy.model_validate(dict(content))
     except ValidationError as error:
-        first, count = error.errors()[0], error.error_count()
+        # where a number or a table may stand, our own check of the table says more than "not a number"
+        details = sorted(error.errors(), key=lambda detail: detail["type"] != "value_error")
+        first, count = details[0], len(details)
         place = ".".join(str(part) for part in first["loc"]) or "the study"
         more = f" (and {count - 1} more)" if count > 1 else ""
         raise StudyError(f"{place}: {first['msg'].removeprefix('Value error, ')}{more}") from error
