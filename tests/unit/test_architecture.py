@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2] / "etc_engine"
-LEAVES = {"errors", "box", "solvers", "models"}
+LEAVES = {"errors", "box", "walls", "solvers", "models"}
 ORDER = (
     ("packing",),
-    ("contacts",),
+    ("contacts", "composite"),
     ("percolation",),
     ("dtem", "pipe", "lattice", "voxel", "meshless"),
     ("effective",),
