@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,34 @@ def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> Non
     InputError
         If spheres lie in one plane: a dump does not tell them from disks.
     """
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        _write_frame(file, table, timestep)
+
+
+def write_trajectory(path: Path | str, trajectory: Trajectory, timestep: float = 1.0) -> None:
+    """Write a trajectory as frames of a LAMMPS text dump, one a time; `read_trajectory` reads it back.
+
+    Parameters
+    ----------
+    path : path
+    trajectory : Trajectory
+    timestep : float [s]
+        Time of one step; every time of the trajectory is rounded to a whole number of them.
+
+    Raises
+    ------
+    InputError
+        If two frames come to lie on one step, or as `write_dump`.
+    """
+    steps = np.rint(trajectory.times / timestep).astype(np.int64)
+    if (np.diff(steps) <= 0).any():
+        raise InputError(f"a time step of {timestep:g} s puts two frames on one step: write with a smaller one")
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        for step, packing in zip(steps.tolist(), trajectory.packings, strict=True):
+            _write_frame(file, ParticleTable(packing, ids=trajectory.ids), step)
+
+
+def _write_frame(file: TextIO, table: ParticleTable, timestep: int) -> None:
     packing = table.packing
     if packing.dimension == 3 and _is_flat(packing.centers[:, 2], packing.radii):
         raise InputError("spheres at one height would be read from a dump as disks: write .csv, .nc or .vtp instead")
@@ -132,13 +160,13 @@ def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> Non
     if table.conductivity is not None:
         columns.append(table.conductivity)
         names += " conductivity"
-    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"ITEM: TIMESTEP\n{timestep}\nITEM: NUMBER OF ATOMS\n{packing.count}\n")
-        file.write(f"ITEM: BOX BOUNDS {' '.join(flags)}\n")
-        file.writelines(f"{low!r} {high!r}\n" for low, high in bounds)
-        file.write(f"ITEM: ATOMS {names}\n")
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        file.writelines(f"{number + 1} 1 {' '.join(map(repr, row))}\n" for number, row in enumerate(rows))
+    ids = np.arange(1, packing.count + 1) if table.ids is None else table.ids
+    file.write(f"ITEM: TIMESTEP\n{timestep}\nITEM: NUMBER OF ATOMS\n{packing.count}\n")
+    file.write(f"ITEM: BOX BOUNDS {' '.join(flags)}\n")
+    file.writelines(f"{low!r} {high!r}\n" for low, high in bounds)
+    file.write(f"ITEM: ATOMS {names}\n")
+    rows = zip(ids.tolist(), *(column.tolist() for column in columns), strict=True)
+    file.writelines(f"{number} 1 {' '.join(map(repr, row))}\n" for number, *row in rows)
 
 
 def _frames(path: Path) -> Iterator[_Frame]:

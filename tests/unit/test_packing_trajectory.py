@@ -5,7 +5,7 @@ import pytest
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError
-from etc_engine.packing.dumps import read_trajectory
+from etc_engine.packing.dumps import read_trajectory, write_trajectory
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.trajectory import Trajectory
 
@@ -34,6 +34,23 @@ def test_particles_keep_their_rows_whatever_the_order_in_the_file(tmp_path):
     assert trajectory.ids.tolist() == [3, 7]
     np.testing.assert_allclose([p.centers[1, 0] for p in trajectory.packings], [0.5, 0.6])
     assert trajectory.packings[0].box == Box((2.0, 1.0), (True, False))
+
+
+def test_a_trajectory_reads_back_bit_by_bit(tmp_path):
+    rng = np.random.default_rng(29)
+    box = Box((2.0, 1.0), (True, False))
+    packings = [ParticlePacking(rng.random((5, 2)) * (2.0, 1.0), rng.uniform(0.1, 0.2, 5), box) for _ in range(3)]
+    written = Trajectory([0.0, 0.5, 1.25], packings, [9, 4, 6, 2, 7])
+    write_trajectory(tmp_path / "t.dump", written, timestep=0.25)
+    back = read_trajectory(tmp_path / "t.dump", timestep=0.25)
+    order = np.argsort(written.ids)
+    np.testing.assert_array_equal(back.times, written.times)
+    np.testing.assert_array_equal(back.ids, written.ids[order])
+    for one, other in zip(back.packings, written.packings, strict=True):
+        np.testing.assert_array_equal(one.centers, other.centers[order])
+        np.testing.assert_array_equal(one.radii, other.radii[order])
+    with pytest.raises(InputError, match="two frames on one step"):
+        write_trajectory(tmp_path / "u.dump", written, timestep=2.0)
 
 
 def test_a_particle_that_leaves_is_named(tmp_path):
