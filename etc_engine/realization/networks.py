@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.dtem.model_error import chord_error_estimate
 from etc_engine.effective import (
     CurvePoint,
     EffectiveConductivity,
@@ -127,13 +128,23 @@ def _dtem_cell(
     except EtcError as error:
         return Cell(Status.ERROR, str(error))
     cell = _solved_cell(network, result, kappa, resistance, time.perf_counter() - start)
-    if method != "exact":
-        return cell
-    bounds = conductivity_bounds(result)
-    return replace(
-        cell,
-        conductivity_bounds=tuple((float(lower), float(upper)) for lower, upper in bounds),
-        solve_seconds=time.perf_counter() - start,
+    if method == "chord":
+        cell = replace(cell, model_error_estimate=_chord_error(result))
+    if method == "exact":
+        bounds = conductivity_bounds(result)
+        widths = [upper / lower - 1.0 for lower, upper in bounds if lower > 0.0]
+        cell = replace(
+            cell,
+            conductivity_bounds=tuple((float(lower), float(upper)) for lower, upper in bounds),
+            model_error_estimate=float(max(widths, default=0.0)),
+        )
+    return replace(cell, solve_seconds=time.perf_counter() - start)
+
+
+def _chord_error(result: EffectiveConductivity) -> float:
+    """Largest estimated model error of a load."""
+    return max(
+        chord_error_estimate(solution, load) for solution in result.solutions for load in range(len(solution.axes))
     )
 
 

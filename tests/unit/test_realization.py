@@ -138,6 +138,9 @@ def test_bounds_of_method_exact_are_in_its_cells():
     spec = RealizationSpec(small, ContactSpec("bonded", (np.radians(5.0),)), ConductionSpec(methods=("chord", "exact")))
     chord, exact = run(spec).cells[0]
     assert chord.conductivity_bounds == ()
+    assert 0.0 < exact.model_error_estimate < 1e-4
+    missed = abs(chord.conductivity[0, 0] / exact.conductivity[0, 0] - 1.0)
+    assert missed < chord.model_error_estimate < 0.05
     for axis, (lower, upper) in enumerate(exact.conductivity_bounds):
         assert lower <= exact.conductivity[axis, axis] <= upper
         assert upper - lower < 1e-5 * upper
