@@ -17,12 +17,11 @@ from etc_engine.effective import (
     conductivity_bounds,
     conductivity_curve,
     effective_conductivity,
-    find_backbones,
     mean_field_conductivity,
 )
 from etc_engine.errors import ConvergenceError, EtcError, InputError
 from etc_engine.packing import ParticlePacking
-from etc_engine.percolation import Backbone
+from etc_engine.percolation import Backbone, find_backbones
 from etc_engine.realization.outcome import Cell, Cells, Status, uniform_cells
 from etc_engine.realization.specification import (
     ConductionSpec,
