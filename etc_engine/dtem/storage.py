@@ -50,7 +50,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.contacts import ContactNetwork
-from etc_engine.dtem.element import Elements, Material, Resistances, cholesky_inverse, packed_starts
+from etc_engine.dtem.element import Elements, Material, cholesky_inverse, packed_starts
 from etc_engine.dtem.methods import find_method, flux_modes
 from etc_engine.dtem.sides import ContactSides
 from etc_engine.errors import GeometryError, InputError

@@ -23,7 +23,7 @@ from etc_engine.dtem.assembly import assemble
 from etc_engine.dtem.element import Elements
 from etc_engine.dtem.sides import ContactSides, check_arcs, contact_sides
 from etc_engine.dtem.steady import make_material
-from etc_engine.dtem.storage import FROM_THIRDS, storing_elements, stored_areas
+from etc_engine.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
 from etc_engine.errors import InputError
 from etc_engine.solvers.marching import HeatSystem
 from etc_engine.walls import WALLS, Convective, FixedTemperature, HeatFlux, Insulated, WallCondition
