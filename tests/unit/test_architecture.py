@@ -19,6 +19,7 @@ ORDER = (
     ("percolation",),
     ("dtem", "lattice", "voxel", "meshless"),
     ("pipe",),  # its pipes have the self-resistances of dtem
+    ("transient",),
     ("effective",),
     ("realization",),
     ("batch",),
