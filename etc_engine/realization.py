@@ -18,13 +18,12 @@ from etc_engine.effective import (
     conductivity_bounds,
     conductivity_curve,
     effective_conductivity,
-    find_backbones,
     mean_field_conductivity,
 )
 from etc_engine.errors import ConvergenceError, EtcError, InputError, PackingError
 from etc_engine.packing import PackingSpec, ParticlePacking, pack
 from etc_engine.packing.structure import solid_fraction
-from etc_engine.percolation import Backbone
+from etc_engine.percolation import Backbone, find_backbones
 
 CURVE_ANGLES = 4
 """From this many half-angles on, solving them together saves time."""

@@ -24,10 +24,10 @@ from etc_engine.dtem.element import Elements
 from etc_engine.dtem.sides import ContactSides, check_arcs, contact_sides
 from etc_engine.dtem.steady import make_material, per_particle
 from etc_engine.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
-from etc_engine.dtem.wall_nodes import WallNodes, number_nodes, wall_conditions
+from etc_engine.dtem.wall_nodes import WallNodes, number_nodes
 from etc_engine.errors import InputError
 from etc_engine.solvers.marching import HeatSystem
-from etc_engine.walls import Insulated, WallCondition
+from etc_engine.walls import Insulated, WallCondition, wall_conditions
 
 Source = ArrayLike | Callable[[float], ArrayLike]
 
@@ -195,7 +195,7 @@ def transient_system(
     """
     if network.packing.dimension != 2:
         raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
-    conditions = wall_conditions(network, walls)
+    conditions = wall_conditions(network.packing.box, walls)
     kept = np.array([not isinstance(c, Insulated) for c in conditions])[network.walls]
     everywhere = np.ones(network.count, dtype=np.bool_)
     reduced = network.select(everywhere, kept)

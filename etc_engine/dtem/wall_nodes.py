@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.sparse import csr_matrix
 
 from etc_engine.contacts import ContactNetwork
 from etc_engine.errors import InputError
-from etc_engine.walls import WALLS, Convective, FixedTemperature, HeatFlux, Insulated, WallCondition
+from etc_engine.walls import WALLS, Convective, FixedTemperature, HeatFlux, WallCondition
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,26 +61,6 @@ class WallNodes:
         return heat
 
 
-def wall_conditions(network: ContactNetwork, walls: Mapping[str, WallCondition]) -> tuple[WallCondition, ...]:
-    """Condition of each wall of the box, those that are not named insulated.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, the box is periodic there, or a heat flux meets no particle.
-    """
-    box = network.packing.box
-    names = WALLS[: 2 * network.packing.dimension]
-    for name, condition in walls.items():
-        if name not in names:
-            raise InputError(f"unknown wall {name!r}: expected one of {', '.join(names)}")
-        if box.periodic[names.index(name) // 2] and not isinstance(condition, Insulated):
-            raise InputError(f"the box is periodic across the {name} wall: there is none to hold a condition")
-        if isinstance(condition, HeatFlux) and not (network.walls == names.index(name)).any():
-            raise InputError(f"no particle touches the {name} wall: its heat flux has nowhere to go; insulate it")
-    return tuple(walls.get(name, Insulated()) for name in names)
-
-
 def number_nodes(network: ContactNetwork, conditions: tuple[WallCondition, ...], modes: int, states: int) -> WallNodes:
     """Number the nodes of a network: modes of its contacts and wall contacts, then states.
 
@@ -94,10 +73,20 @@ def number_nodes(network: ContactNetwork, conditions: tuple[WallCondition, ...],
         Flux modes of a contact. A wall is isothermal, so that it holds all but mode 0 of its contacts at zero.
     states : int
         States of all particles.
+
+    Raises
+    ------
+    InputError
+        If a heat flux meets no particle.
     """
     number, walls = len(conditions), network.walls
     held = np.array([isinstance(c, FixedTemperature) for c in conditions])
     touched = np.isin(np.arange(number), walls)
+    for wall, condition in enumerate(conditions):
+        if isinstance(condition, HeatFlux) and not touched[wall]:
+            raise InputError(
+                f"no particle touches the {WALLS[wall]} wall: its heat flux has nowhere to go; insulate it"
+            )
     has_plate = np.array([isinstance(c, HeatFlux | Convective) for c in conditions]) & touched
     at_wall = modes * (network.count + np.arange(walls.size))  # mode 0 of each wall contact
 
@@ -110,8 +99,7 @@ def number_nodes(network: ContactNetwork, conditions: tuple[WallCondition, ...],
     size = contacts + int(has_plate.sum()) + states
     nodes = unknowns.size + states
     here = held[walls]
-    lengths = network.packing.box.lengths
-    faces = np.array([lengths[1 - wall // 2] for wall in range(number)])
+    faces = np.array([network.packing.box.cross_section(wall // 2) for wall in range(number)])
     return WallNodes(
         conditions=conditions,
         plates=plates,
