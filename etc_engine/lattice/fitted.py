@@ -70,7 +70,7 @@ class _Pairs:
     outer: NDArray[np.bool_]
 
 
-def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator) -> FittedSeeds:
+def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box: Box | None = None) -> FittedSeeds:
     r"""About `count` seeds whose Laguerre facets follow the surfaces of spherical inclusions.
 
     Pairs of seeds mirror each other in the tangent planes of a sphere, at :math:`a' (1 \pm \delta / a')`; the facet
@@ -86,8 +86,10 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator) -> 
     composite : Composite
         Spheres in a matrix.
     count : int
-        Number of seeds wanted; the number made differs by some per cent.
+        Number of seeds wanted, met within some per cent.
     rng : numpy.random.Generator
+    box : Box, optional
+        The box of the lattice, where it has walls that the composite does not; the composite's by default.
 
     Returns
     -------
@@ -114,10 +116,10 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator) -> 
     True
     """
     inclusions = composite.inclusions
-    box = inclusions.box
+    box = box or inclusions.box
     if box.dimension != 3:
         raise GeometryError(f"fitted seeds need a three-dimensional box, found {box.dimension} dimensions")
-    h = float((box.volume / count) ** (1.0 / 3.0))
+    h = _spacing(composite, count, box)
     small = int(np.argmin(inclusions.radii))
     if inclusions.radii[small] < SMALLEST * h:
         needed = int(np.ceil(box.volume * (SMALLEST / float(inclusions.radii[small])) ** 3))
@@ -126,8 +128,19 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator) -> 
             f"use at least {needed}"
         )
     pairs = _pairs_on_spheres(inclusions, h, rng)
-    bulk = _bulk_seeds(composite, count, h, rng)
-    return _tuned(composite, pairs, bulk, h)
+    bulk = pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.5, spread=0.0).centers
+    bulk = bulk[_interface_distance(composite, bulk) > CLEARANCE * h]
+    return _tuned(composite, pairs, bulk, h, box)
+
+
+def _spacing(composite: Composite, count: int, box: Box) -> float:
+    """Seed spacing for which pairs on the spheres and the seeds that make room for them come to `count` in all."""
+    radii = composite.inclusions.radii
+    h = float((box.volume / count) ** (1.0 / 3.0))
+    for _ in range(30):
+        more = 4.0 * np.pi * float((radii**2).sum()) * (2.0 / PATCH - 2.0 * CLEARANCE) / h**2
+        h = float((box.volume / max(count - more, 0.2 * count)) ** (1.0 / 3.0))
+    return h
 
 
 def _pairs_on_spheres(inclusions: ParticlePacking, h: float, rng: np.random.Generator) -> _Pairs:
@@ -171,14 +184,9 @@ def _spread_directions(number: int, rng: np.random.Generator) -> NDArray[np.floa
     angle = np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - z * z)
     turn, upper = np.linalg.qr(rng.standard_normal((3, 3)))
-    return np.asarray(np.column_stack((ring * np.cos(angle), ring * np.sin(angle), z)) @ (turn * np.sign(np.diag(upper))))
-
-
-def _bulk_seeds(composite: Composite, count: int, h: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Centres of a random packing of equal spheres, away from the interfaces."""
-    box = composite.inclusions.box
-    points = pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.5, spread=0.0).centers
-    return points[_interface_distance(composite, points) > CLEARANCE * h]
+    return np.asarray(
+        np.column_stack((ring * np.cos(angle), ring * np.sin(angle), z)) @ (turn * np.sign(np.diag(upper)))
+    )
 
 
 def _interface_distance(composite: Composite, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -196,28 +204,27 @@ def _interface_distance(composite: Composite, points: NDArray[np.float64]) -> ND
 
 
 def _assemble(
-    composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: float, kappa: float
+    composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: float, kappa: float, box: Box
 ) -> FittedSeeds:
     """Seeds for a tuned radius."""
     inclusions = composite.inclusions
-    box = inclusions.box
     a = inclusions.radii[pairs.sphere]
     tuned = a * (1.0 - kappa * (h / a) ** 2)
     middle = inclusions.centers[pairs.sphere]
     inner = middle + (tuned - pairs.offset)[:, None] * pairs.normal
     outer = (middle + (tuned + pairs.offset)[:, None] * pairs.normal)[pairs.outer]
-    points = box.wrap(np.concatenate((inner, outer, bulk)))
+    points = inclusions.box.wrap(np.concatenate((inner, outer, bulk)))
     owner = np.concatenate((pairs.sphere, np.full(len(outer), MATRIX), composite.phase(bulk)))
     kept = np.asarray((np.asarray(box.periodic) | ((points > 0.0) & (points < np.asarray(box.lengths)))).all(axis=1))
     return FittedSeeds(ParticlePacking(points[kept], np.full(int(kept.sum()), WEIGHT * h), box), owner[kept])
 
 
-def _tuned(composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: float) -> FittedSeeds:
+def _tuned(composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: float, box: Box) -> FittedSeeds:
     """Secant iteration on kappa until the inclusions' cells have the exact volume."""
     goal = composite.volume_fraction * composite.inclusions.box.volume
 
     def excess(kappa: float) -> tuple[float, FittedSeeds]:
-        seeds = _assemble(composite, pairs, bulk, h, kappa)
+        seeds = _assemble(composite, pairs, bulk, h, kappa, box)
         volumes = laguerre_facets(seeds.packing).volumes
         return float(volumes[seeds.owner != MATRIX].sum()) / goal - 1.0, seeds
 
@@ -235,6 +242,6 @@ def _tuned(composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: fl
     missing = np.setdiff1d(np.arange(composite.inclusions.count), made.owner)
     if missing.size:
         raise GeometryError(
-            f"inclusion {missing[0]} holds no lattice particle: use more particles, or remove what other inclusions cover"
+            f"inclusion {missing[0]} holds no lattice particle: use more particles, or remove it if others cover it"
         )
     return made

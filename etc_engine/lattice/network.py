@@ -300,8 +300,6 @@ def link_conductances(
     return Conductances(lattice.sections / resistance, lattice.wall_sections / wall_resistance)
 
 
-def _branches(
-    packing: ParticlePacking, pairs: NDArray[np.int64], shifts: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _branches(packing: ParticlePacking, pairs: NDArray[np.int64], shifts: NDArray[np.int64]) -> NDArray[np.float64]:
     lengths = np.asarray(packing.box.lengths)
     return packing.centers[pairs[:, 1]] - packing.centers[pairs[:, 0]] + shifts * lengths

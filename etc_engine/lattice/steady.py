@@ -256,7 +256,7 @@ def conductivity_tensor(
 
 
 def _solve(
-    matrix: csr_matrix, rhs: NDArray[np.float64], lift: float, tolerance: float
+    matrix: csr_matrix, rhs: NDArray, lift: float, tolerance: float
 ) -> tuple[NDArray[np.float64], float, SolveReport]:
     """Temperatures, energy and report; one node of every cluster that touches no held wall is set to 0.
 
