@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from etc_engine.errors import InputError
 from etc_engine.lattice.clipping import sort_into_grid
@@ -124,6 +125,63 @@ def near_wall(lattice: Lattice, radius: float) -> NDArray[np.bool_]:
     box, centers = lattice.packing.box, lattice.packing.centers
     over = (centers < radius) | (centers > np.asarray(box.lengths) - radius)
     return np.asarray((over & ~np.asarray(box.periodic)).any(axis=1))
+
+
+def probe(
+    field: SteadyField, points: ArrayLike, conductivity: ArrayLike = 1.0, *, nodes: int = 30
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Temperature and heat flux density at points.
+
+    The temperature is that of the nearest node, carried to the point by the node's own gradient -q/k. The heat flux is
+    the value there of a linear function fitted to the nearest nodes of the same conductivity.
+
+    Parameters
+    ----------
+    field : SteadyField
+        Of a Laguerre lattice between walls.
+    points : array_like, shape (m, 3) [m]
+    conductivity : float or array_like, shape (n,) [W/(m K)]
+        Of each node.
+    nodes : int
+        Nodes that a fit takes into account before those of another conductivity are left out.
+
+    Returns
+    -------
+    temperatures : ndarray, shape (m,) [K]
+    fluxes : ndarray, shape (m, 3) [W/m2]
+
+    Raises
+    ------
+    InputError
+        If the box is periodic: there the temperature is no function of the place.
+
+    Examples
+    --------
+    >>> from etc_engine.lattice.calibration import pack_lattice
+    >>> from etc_engine.lattice.network import laguerre_lattice, link_conductances
+    >>> from etc_engine.lattice.steady import solve_between_walls
+    >>> packing = pack_lattice(200, (1, 1, 1), np.random.default_rng(5), periodic=(False,) * 3, density=0.3)
+    >>> lattice = laguerre_lattice(packing)
+    >>> field = solve_between_walls(lattice, link_conductances(lattice, 2.0), 0)
+    >>> temperatures, fluxes = probe(field, [[0.25, 0.5, 0.5]], 2.0)
+    >>> temperatures.round(6), np.abs(fluxes).round(6)
+    (array([0.75]), array([[2., 0., 0.]]))
+    """
+    lattice = field.lattice
+    if any(lattice.packing.box.periodic):
+        raise InputError("a temperature can be read at a point between walls only: this box is periodic")
+    k = np.broadcast_to(np.asarray(conductivity, dtype=np.float64), (lattice.count,))
+    centers, points = lattice.packing.centers, np.asarray(points, dtype=np.float64)
+    local = flux_moments(field) / lattice.volumes[:, None]
+    near = cKDTree(centers).query(points, min(nodes, lattice.count))[1]
+    temperatures, fluxes = np.empty(len(points)), np.empty((len(points), 3))
+    for row, (point, found) in enumerate(zip(points, near, strict=True)):
+        nearest = found[0]
+        temperatures[row] = field.temperatures[nearest] - (point - centers[nearest]) @ local[nearest] / k[nearest]
+        same = found[k[found] == k[nearest]]
+        linear = np.column_stack((np.ones(same.size), centers[same] - point))
+        fluxes[row] = np.linalg.lstsq(linear, local[same], rcond=None)[0][0]
+    return temperatures, fluxes
 
 
 @njit(cache=True)
