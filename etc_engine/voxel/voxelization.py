@@ -119,6 +119,9 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     inclusions does too (that is where `Composite` divides them), by the kernels behind the exact solid fraction. A voxel
     with pieces f_i of several inclusions is one laminate of all their phases and the matrix, normal to the
     principal axis of :math:`\sum f_i (1 - f_i) n_i n_i^T`: right for the thin layer of matrix between two inclusions.
+    A voxel that holds part of an insulator (a perfect conductor) is isotropic with the mean conductivity (mean
+    resistivity) instead: no heat crosses the interface, so that nothing is gained by a laminate that insulates
+    whole voxels along the normal; the error is a tenth.
 
     References
     ----------
@@ -201,8 +204,13 @@ def _laminates(
         moments, of[~alone], weight[~alone, None, None] * pieces.normal[~alone, :, None] * pieces.normal[~alone, None, :]
     )
     axes[~single] = np.linalg.eigh(moments[~single])[1][:, :, ::-1]
+    least = np.full(rows.size, composite.matrix)
+    largest = least.copy()
+    np.minimum.at(least, of, k)
+    np.maximum.at(largest, of, k)
     principal = np.repeat(parallel[:, None], d, axis=1)
-    principal[:, 0] = np.minimum(series, parallel)
+    principal[:, 0] = np.where(least > 0.0, np.minimum(series, parallel), parallel)
+    principal[np.isinf(largest)] = series[np.isinf(largest), None]
     return rows, principal, axes
 
 
