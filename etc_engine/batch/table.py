@@ -41,6 +41,9 @@ CELL_VARIABLES = {
     "unknowns": Variable(np.int64, -1, "number of unknowns of the linear system, after pruning"),
     "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
     "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
+    "model_error_estimate": Variable(
+        np.float64, np.nan, "estimated relative error of the method: chord, if solved in full, and exact"
+    ),
     "mean_field_conductivity": Variable(
         np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
     ),

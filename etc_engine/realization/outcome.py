@@ -27,9 +27,11 @@ class Cell:
     """The outcome for one contact angle (or contrast) and one method.
 
     ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
-    ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``solved_by`` is ``full``, or
-    ``reduced`` where the conductivity comes from the solutions at other contact angles, ``snapshots`` of them.
-    ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each axis, of method ``exact`` only.
+    ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``model_error_estimate`` is
+    what the method is estimated to miss, where it tells: ``chord`` solved in full, ``exact`` by its bounds.
+    ``solved_by`` is ``full``, or ``reduced`` where the conductivity comes from the solutions at other
+    contact angles, ``snapshots`` of them. ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each
+    axis, of method ``exact`` only.
     """
 
     status: Status
@@ -43,6 +45,7 @@ class Cell:
     relative_energy_error: float = np.nan
     solve_seconds: float = 0.0
     mean_field_conductivity: float = np.nan
+    model_error_estimate: float = np.nan
     solved_by: str = ""
     snapshots: int = 0
     conductivity_bounds: tuple[tuple[float, float], ...] = ()

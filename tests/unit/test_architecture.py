@@ -17,7 +17,8 @@ ORDER = (
     ("packing",),
     ("contacts", "composite"),
     ("percolation",),
-    ("dtem", "pipe", "lattice", "voxel", "meshless"),
+    ("dtem", "lattice", "voxel", "meshless"),
+    ("pipe",),  # its pipes have the self-resistances of dtem
     ("effective",),
     ("realization",),
     ("batch",),
