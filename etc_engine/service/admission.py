@@ -131,7 +131,7 @@ def field_of(message: str) -> str:
             name = word.partition("[")[0]
             fields = {} if table is None else {f.alias or n: f for n, f in table.model_fields.items()}
             if name not in fields:
-                return ".".join([*words, name] if len(words) == 1 and name.isidentifier() else words)
+                return ".".join([*words, name] if "unknown key" in message else words)
             words.append(name)
             kind = fields[name].annotation
             table = kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None

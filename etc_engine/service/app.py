@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Annotated, Any, Literal
 
@@ -69,6 +70,7 @@ class Service:
     live: LiveResults
     runner: Runner
     wake: Callable[[], None]
+    changing: threading.Lock = field(default_factory=threading.Lock)
 
 
 def _finite(value: float | None) -> float | None:
@@ -181,9 +183,10 @@ def remove_study(request: Request, study: Id) -> None:
     """Forget a study and all its files; one that runs has to be cancelled first."""
     service = _service(request)
     _entry(request, study)
-    if not service.queue.remove(study):
-        raise HTTPException(409, "the study is running: cancel it first")
-    service.store.remove(study)
+    with service.changing:
+        if not service.queue.remove(study):
+            raise HTTPException(409, "the study is running: cancel it first")
+        service.store.remove(study)
     service.live.forget(study)
 
 
@@ -311,13 +314,18 @@ def _finished(request: Request, study: str) -> str:
 
 
 def _submit(service: Service, text: str) -> tuple[Entry, bool]:
-    """Check a study, keep its text, put it in the queue: in this order, so that the queue names nothing that is not there."""
-    application = apply(text, service.settings.limits)
-    known = service.queue.get(application.id)
-    if known is not None:
-        return known, False
-    service.store.save_study(application.id, text)
-    entry, new = service.queue.submit(application.id, application.study.name, application.units, application.most)
+    """Check a study, keep its text, put it in the queue: so the queue never names what is not there.
+
+    One that was cancelled or has failed goes on.
+    """
+    found = apply(text, service.settings.limits)
+    with service.changing:
+        known = service.queue.get(found.id)
+        if known is None:
+            service.store.save_study(found.id, text)
+        elif known.state in ("cancelled", "failed"):
+            service.queue.resume(found.id)
+        entry, new = service.queue.submit(found.id, found.study.name, found.units, found.most)
     service.wake()
     return entry, new
 

@@ -42,6 +42,9 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         If the address is in use, or the data directory is, or that cannot be written.
     """
     check_access(settings)
+    import netCDF4  # noqa: F401 - loaded now, so that the first figure does not wait for it
+    import xarray  # noqa: F401
+
     logging.basicConfig(format="etc-engine: %(message)s", level=logging.WARNING)
     listener = _listen(settings)
     with listener, open_store(settings.data) as store:

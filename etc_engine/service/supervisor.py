@@ -156,9 +156,8 @@ class Supervisor:
         """Decide what the end of a batch means."""
         if not self._launcher.outlives:
             self._launcher.kill(entry.id, entry.batch)  # ranks that have lost their launcher
-        if self._store.result(entry.id).exists():
-            units, failed_cells = self._live.outcome(entry.id)
-            self._queue.finish(entry.id, units, failed_cells)
+        if self._store.result(entry.id).is_file():
+            self._finish(entry)
         elif entry.cancelling or reason:
             self._count(entry)
             self._queue.settle(entry.id, "cancelled" if entry.cancelling else "failed", reason or "cancelled")
@@ -171,6 +170,15 @@ class Supervisor:
                 self._queue.settle(entry.id, "failed", said)
             else:
                 self._try_again(self._queue.require(entry.id), said)
+
+    def _finish(self, entry: Entry) -> None:
+        """The result is there: complete, unless somebody has meddled with it."""
+        try:
+            units, failed_cells = self._live.outcome(entry.id)
+        except EtcError as error:
+            self._queue.settle(entry.id, "failed", str(error))
+        else:
+            self._queue.finish(entry.id, units, failed_cells)
 
     def _try_again(self, entry: Entry, reason: str) -> None:
         """The study goes on at once after progress, a little later without, and fails after three such starts."""

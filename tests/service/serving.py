@@ -66,13 +66,14 @@ class Service:
         options: dict[str, Any] = {"data": str(self.data), "port": 0, **self.options}
         if self.slow:
             options["engine"] = [sys.executable, str(SLOW_ENGINE)]
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", START, json.dumps(options)],
-            stdout=subprocess.PIPE,
-            stderr=(self.data.parent / "service.log").open("a"),
-            text=True,
-            env={**os.environ, **self.environment},
-        )
+        with (self.data.parent / "service.log").open("a") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", START, json.dumps(options)],
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                env={**os.environ, **self.environment},
+            )
         self.url = self.process.stdout.readline().strip()
         assert self.url, (self.data.parent / "service.log").read_text()
         return self
