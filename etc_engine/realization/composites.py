@@ -9,10 +9,12 @@ import numpy as np
 
 from etc_engine.composite import Composite, Homogenized
 from etc_engine.errors import ConvergenceError, EtcError
+from etc_engine.lattice.homogenize import homogenize_lattice
 from etc_engine.packing import ParticlePacking
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.realization.outcome import Cell, Cells, Status
 from etc_engine.realization.specification import CompositeSpec, RealizationSpec, particle_conductivities
+from etc_engine.voxel.homogenize import homogenize_voxel
 
 TOUCHING = 1e-6
 """Surfaces closer than this, in mean radii of the pair, count as a contact."""
@@ -21,7 +23,32 @@ Homogenize = Callable[[Composite, str, CompositeSpec, float, int], Homogenized]
 """(composite, method, spec, tolerance, seed) -> effective conductivity."""
 
 
-def conduct_composite(
+def conduct_voxel(packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator) -> Cells:
+    """FFT homogenization; a method is the kind of voxel."""
+
+    def homogenize(composite: Composite, method: str, spec: CompositeSpec, tolerance: float, _: int) -> Homogenized:
+        return homogenize_voxel(composite, resolution=spec.resolution, voxels=method, tolerance=tolerance)
+
+    return _conduct(packing, spec, rng, homogenize)
+
+
+def conduct_lattice(packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator) -> Cells:
+    """Particle lattice; a method is the way the conductances between its nodes are made."""
+
+    def homogenize(composite: Composite, method: str, spec: CompositeSpec, tolerance: float, seed: int) -> Homogenized:
+        return homogenize_lattice(
+            composite,
+            rng=np.random.default_rng(seed),
+            particles=spec.nodes,
+            boundary="periodic" if all(composite.inclusions.box.periodic) else "walls",
+            transmission=method,
+            tolerance=tolerance,
+        )
+
+    return _conduct(packing, spec, rng, homogenize)
+
+
+def _conduct(
     packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator, homogenize: Homogenize
 ) -> Cells:
     """Solve every contrast and method on one packing of inclusions.
