@@ -1,1 +1,1 @@
-"""Heat conduction in time through contact networks: moving particles."""
+"""Transients on contact networks: the study file, the system it describes, the run and its restart."""
