@@ -28,6 +28,10 @@ COMMANDS = {
     "rerun": "etc_engine.cli.rerun:rerun_command",
     "models": "etc_engine.cli.models:models_command",
     "transient": "etc_engine.cli.transient:transient_command",
+    "serve": "etc_engine.cli.serve:serve_command",
+    "submit": "etc_engine.cli.submit:submit_command",
+    "status": "etc_engine.cli.status:status_command",
+    "fetch": "etc_engine.cli.fetch:fetch_command",
 }
 
 EXIT_DONE = 0

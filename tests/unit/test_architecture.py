@@ -12,13 +12,14 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2] / "etc_engine"
-LEAVES = {"errors", "box", "solvers", "models", "walls"}
+LEAVES = {"errors", "box", "walls", "solvers", "models"}
 ORDER = (
     ("packing",),
-    ("contacts",),
+    ("contacts", "composite"),
     ("percolation",),
     ("dtem", "lattice", "voxel", "meshless"),
     ("pipe",),  # its pipes have the self-resistances of dtem
+    ("transient",),
     ("effective",),
     ("realization",),
     ("batch",),

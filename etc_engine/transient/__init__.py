@@ -1,0 +1,1 @@
+"""Heat conduction in time through contact networks: moving particles."""
