@@ -116,8 +116,8 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     Notes
     -----
     Fractions are exact: in closed form where one surface crosses a voxel; where the radical plane of two overlapping
-    inclusions does too (that is where `Composite` divides them), by the kernels behind the exact solid fraction. A voxel
-    with pieces f_i of several inclusions is one laminate of all their phases and the matrix, normal to the
+    inclusions does too (that is where `Composite` divides them), by the kernels behind the exact solid fraction. A
+    voxel with pieces f_i of several inclusions is one laminate of all their phases and the matrix, normal to the
     principal axis of :math:`\sum f_i (1 - f_i) n_i n_i^T`: right for the thin layer of matrix between two inclusions.
     A voxel that holds part of an insulator (a perfect conductor) is isotropic with the mean conductivity (mean
     resistivity) instead: no heat crosses the interface, so that nothing is gained by a laminate that insulates
@@ -143,7 +143,7 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
         raise InputError(f"a grid has at least 2 voxels along an edge, found a resolution of {resolution}")
     shape = grid_shape(composite.inclusions.box.lengths, resolution)
     pieces = _find_pieces(composite, shape)
-    fractions = np.bincount(pieces.voxel, pieces.fraction, pieces.owner.size)
+    fractions = np.bincount(pieces.voxel, pieces.fraction, pieces.owner.size).astype(np.float64)
     fractions[pieces.owner >= 0] = 1.0
     scalars = np.append(composite.inclusion, composite.matrix)[pieces.owner]
     if voxels == "binary":
@@ -201,14 +201,16 @@ def _laminates(
     axes[of[alone]] = _frame(pieces.normal[alone])
     moments = np.zeros((rows.size, d, d))
     np.add.at(
-        moments, of[~alone], weight[~alone, None, None] * pieces.normal[~alone, :, None] * pieces.normal[~alone, None, :]
+        moments,
+        of[~alone],
+        weight[~alone, None, None] * pieces.normal[~alone, :, None] * pieces.normal[~alone, None, :],
     )
     axes[~single] = np.linalg.eigh(moments[~single])[1][:, :, ::-1]
     least = np.full(rows.size, composite.matrix)
     largest = least.copy()
     np.minimum.at(least, of, k)
     np.maximum.at(largest, of, k)
-    principal = np.repeat(parallel[:, None], d, axis=1)
+    principal = np.repeat(parallel[:, None], d, axis=1).astype(np.float64)
     principal[:, 0] = np.where(least > 0.0, np.minimum(series, parallel), parallel)
     principal[np.isinf(largest)] = series[np.isinf(largest), None]
     return rows, principal, axes
