@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from browser import MISSING, Browser
+from browser import ELEMENT, MISSING, Browser
 from serving import STUDY, Service, ask, renamed, until
 
 from etc_engine.service import client
