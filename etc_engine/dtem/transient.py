@@ -182,6 +182,9 @@ def transient_system(
     The heat balance of `march` is exact where its solver is (small systems) and with one flux mode a contact; with
     ``arc`` and an iterative solver it holds to the solver's tolerance.
 
+    At rest the temperatures are those of `solve_steady`; of ``arc`` on the backbone alone, since here dead ends take
+    fluxes of no sum from the contacts that hold them, which shifts the others by some 1e-5.
+
     Examples
     --------
     >>> from etc_engine import Box, ParticlePacking, bonded_contacts
