@@ -76,7 +76,7 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
     Returns
     -------
     Trajectory
-        Its times start at 0.
+        Its times start at 0; the conductivities are those of the first frame.
 
     Raises
     ------
@@ -92,6 +92,7 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
     if not (np.isfinite(timestep) and timestep > 0.0):
         raise InputError(f"the time step of a dump must be positive, found {timestep:g}")
     steps, packings = [], []
+    conductivity: NDArray[np.float64] | None = None
     ids: NDArray[np.int64] | None = None
     for number, frame in enumerate(_frames(path)):
         table = _particles(path, frame)
@@ -101,12 +102,14 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
             odd = np.setxor1d(ids, table.ids)
             what = f"particle {odd[0]} is not in both" if odd.size else "ids repeat"
             raise InputError(f"{path}: frame {number} does not hold the particles of frame 0 ({what}): all must stay")
+        if ids is None:
+            conductivity = table.conductivity
         ids = table.ids
         steps.append(frame.timestep)
         packings.append(table.packing)
     assert ids is not None
     times = timestep * (np.array(steps, dtype=np.float64) - steps[0])
-    return Trajectory(times, tuple(packings), ids)
+    return Trajectory(times, tuple(packings), ids, conductivity)
 
 
 def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> None:
@@ -141,7 +144,7 @@ def write_trajectory(path: Path | str, trajectory: Trajectory, timestep: float =
         raise InputError(f"a time step of {timestep:g} s puts two frames on one step: write with a smaller one")
     with Path(path).open("w", encoding="utf-8", newline="\n") as file:
         for step, packing in zip(steps.tolist(), trajectory.packings, strict=True):
-            _write_frame(file, ParticleTable(packing, ids=trajectory.ids), step)
+            _write_frame(file, ParticleTable(packing, trajectory.conductivity, trajectory.ids), step)
 
 
 def _write_frame(file: TextIO, table: ParticleTable, timestep: int) -> None:
