@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 
 from etc_engine.contacts import ContactNetwork
-from etc_engine.dtem.steady import make_material
 from etc_engine.dtem.storage import stored_areas
 from etc_engine.errors import InputError
 from etc_engine.pipe.conductances import PIPE_RESISTANCES, pipe_conductances
@@ -142,7 +141,9 @@ def pipe_transient(
     between, at_wall = pipe_conductances(
         network, resistance=resistance, conductivity=conductivity, contact_resistance=contact_resistance
     )
-    density = make_material(network, heat_capacity, 0.0).conductivity
+    density = _of_particles(heat_capacity, n, "heat capacity")
+    if not (density > 0.0).all():
+        raise InputError(f"the heat capacity must be positive, found {density.min():g}")
     capacity = density * stored_areas(network, PIPE_RESISTANCES[resistance])
 
     touched = np.isin(np.arange(len(conditions)), network.walls)

@@ -52,8 +52,8 @@ def write_vtp(path: Path, solution: SteadySolution | PipeSolution, field: Partic
     places = vtkPoints()
     places.SetData(numpy_to_vtk(np.column_stack([ends, np.zeros(len(ends))]), deep=True))
     data.SetPoints(places)
-    data.SetLines(_cells([len(points) + np.arange(2 * len(flow)).reshape(-1, 2)]))
-    data.SetPolys(_cells(polygons))
+    data.SetLines(vtk_cells([len(points) + np.arange(2 * len(flow)).reshape(-1, 2)]))
+    data.SetPolys(vtk_cells(polygons))
     pad = np.full(2 * len(flow), np.nan)
     for name, values, place in (
         ("temperature", np.concatenate([temperature, pad]), data.GetPointData()),
@@ -71,7 +71,8 @@ def write_vtp(path: Path, solution: SteadySolution | PipeSolution, field: Partic
         raise OutputError(f"cannot write {path}")
 
 
-def _cells(groups: list[NDArray[np.int64]]) -> Any:
+def vtk_cells(groups: list[NDArray[np.int64]]) -> Any:
+    """Cells of VTK out of lists of point numbers, each list of one width."""
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonDataModel import vtkCellArray
 

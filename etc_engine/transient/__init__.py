@@ -1,1 +1,1 @@
-"""Heat conduction in time through contact networks: moving particles."""
+"""Transients on contact networks: study files, systems, runs and restarts, moving particles."""

@@ -18,11 +18,11 @@ ORDER = (
     ("contacts", "composite"),
     ("percolation",),
     ("dtem", "lattice", "voxel", "meshless"),
-    ("pipe",),  # its pipes have the self-resistances of dtem
-    ("transient",),
+    ("pipe",),  # its pipes have the self-resistances of dtem, and store heat in the same areas
     ("effective",),
     ("realization",),
     ("batch",),
+    ("transient",),
     ("results",),
     ("comparison",),
     ("figures",),

@@ -187,7 +187,7 @@ def test_time_scales_with_capacity_over_conductivity(random_network):
     [
         ({"walls": {"west": Insulated()}}, "unknown wall 'west': expected one of left, right, bottom, top"),
         ({"walls": {"top": HeatFlux(1.0)}}, "no particle touches the top wall"),
-        ({"heat_capacity": 0.0}, "must be positive"),
+        ({"heat_capacity": 0.0}, "the heat capacity must be positive, found 0"),
         ({"source": np.ones(3)}, "the source must be one finite number or 4 of them"),
         ({"resistance": "round"}, "unknown pipe resistance"),
     ],
