@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -217,11 +218,15 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
         raise InputError(f"{path}: the frame at step {frame.timestep} holds no particles")
     if "xy" in frame.box_header:
         raise InputError(f"{path} has a triclinic box; only boxes with right angles are understood")
-    bounds = np.array([[float(word) for word in line.split()[:2]] for line in frame.box_lines])
+    bounds = _bounds(path, frame)
     try:
-        values = np.loadtxt(io.StringIO("\n".join(frame.atoms)), ndmin=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an empty table is refused below, in our words
+            values = np.loadtxt(io.StringIO("\n".join(frame.atoms)), ndmin=2)
     except ValueError as error:
         raise InputError(f"{path}: the frame at step {frame.timestep} is not a table of numbers: {error}") from None
+    if len(values) != len(frame.atoms):
+        raise InputError(f"{path}: the frame at step {frame.timestep} has {len(frame.atoms) - len(values)} empty lines")
     if values.shape[1] != len(frame.columns):
         raise InputError(f"{path}: {len(frame.columns)} columns are named, {values.shape[1]} found")
     columns = dict(zip(frame.columns, values.T, strict=True))
@@ -242,6 +247,19 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
     )
     centers = np.stack(positions[:dimension], axis=1) - bounds[:dimension, 0]
     return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"), ids)
+
+
+def _bounds(path: Path, frame: _Frame) -> NDArray[np.float64]:
+    """Lower and upper bound of the box along each axis, shape (3, 2)."""
+    try:
+        bounds = np.array([[float(word) for word in line.split()[:2]] for line in frame.box_lines])
+        valid = bounds.shape == (3, 2) and bool(np.isfinite(bounds).all()) and len(frame.box_header) in (0, 3)
+    except ValueError:
+        valid = False
+    if not valid:
+        found = "; ".join(line.strip() for line in frame.box_lines)
+        raise InputError(f"{path}: the box at step {frame.timestep} needs two numbers an axis, found {found[:80]!r}")
+    return bounds
 
 
 def _is_flat(heights: NDArray[np.float64], radii: NDArray[np.float64]) -> bool:
