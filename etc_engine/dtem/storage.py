@@ -19,8 +19,9 @@ where h' is h without its ln 2. Hence Q = A (T_c - T_o e) with A = (H' + e e^T/(
 
 is symmetric, positive semi-definite and blind to a common temperature. At rest, S = 0, it is the steady element.
 
-**Dipoles.** What is left out decays slowest where the temperature varies as cos(angle) and sin(angle): that part follows
-a change of flux only after R^2 rho c/kappa. Let the storage have such a part too, rho c dT/dt = s r cos(angle). Then
+**Dipoles.** What is left out decays slowest where the temperature varies as cos(angle) and sin(angle): that part
+follows a change of flux only after R^2 rho c/kappa. Let the storage have such a part too, rho c dT/dt = s r cos(angle).
+Then
 
     kappa Lap T = s r cos  =>  T = [s r^3/(8 kappa) + b r] cos,   flux q = 3 s R^2/8 + kappa b,
 
@@ -28,15 +29,16 @@ and with D the amplitude at the rim of the linear field that fits T best, D = 4/
 
     D = (R/kappa) (q - 7 s R^2/24),      T(R) = (6/7) D + (1/7) q R/kappa,      dD/dt = s R/(rho c).
 
-The flux of the contacts has q = u . Q/(pi R), u_i the mean of cos(angle) over arc i, and H' holds the quasi-steady answer
-u u^T/(pi kappa) of this harmonic. Taking 6/7 of it away and giving it to the state D makes
+The flux of the contacts has q = u . Q/(pi R), u_i the mean of cos(angle) over arc i, and H' holds the quasi-steady
+answer u u^T/(pi kappa) of this harmonic. Taking 6/7 of it away and giving it to the state D makes
 
     T_c = T_o e + (6/7)(D_c u + D_s v) + H'' Q,      H'' = H' + e e^T/(8 pi kappa) - (6/7)(u u^T + v v^T)/(pi kappa),
     (rho c V/4) dD_c/dt = (6/7) u . Q - (6/7) pi kappa D_c,     likewise D_s with v,
 
 symmetric again. It relaxes at the rate 24/7 = 3.429 kappa/(rho c R^2), where the disk's own is j'_11^2 = 3.390.
 
-**States as temperatures.** The mean and the dipoles are those of three thirds of the disk at angles 0, 120 and 240 degrees,
+**States as temperatures.** The mean and the dipoles are those of three thirds of the disk at angles 0, 120 and 240
+degrees,
 
     T_k = T_o + (D_c cos phi_k + D_s sin phi_k)/sqrt(2),      each of the heat capacity rho c V/3:
 
