@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from etc_engine.box import Box
 from etc_engine.errors import InputError
 
 WALLS = ("left", "right", "bottom", "top", "front", "back")
@@ -172,3 +173,30 @@ class Insulated:
 
 
 WallCondition = FixedTemperature | HeatFlux | Convective | Insulated
+
+
+def wall_conditions(box: Box, named: Mapping[str, WallCondition]) -> tuple[WallCondition, ...]:
+    """Condition at each wall of a box, in the order of `WALLS`; a wall that is not named is insulated.
+
+    Parameters
+    ----------
+    box : Box
+    named : mapping of str to WallCondition
+
+    Raises
+    ------
+    InputError
+        If there is no wall of that name, or none because the box is periodic there.
+
+    Examples
+    --------
+    >>> wall_conditions(Box((1.0, 1.0)), {"left": FixedTemperature(300.0)})[:2]
+    (FixedTemperature(value=300.0), Insulated())
+    """
+    names = WALLS[: 2 * box.dimension]
+    for name, condition in named.items():
+        if name not in names:
+            raise InputError(f"unknown wall {name!r}: expected one of {', '.join(names)}")
+        if box.periodic[names.index(name) // 2] and not isinstance(condition, Insulated):
+            raise InputError(f"the box is periodic across the {name} wall: there is none to hold a condition")
+    return tuple(named.get(name, Insulated()) for name in names)

@@ -46,9 +46,9 @@ class Holder:
         return cls(
             run=run,
             host=socket.gethostname(),
-            boot=_boot(),
+            boot=boot_identity(),
             process=os.getpid(),
-            process_start=_process_start(os.getpid()),
+            process_start=process_start_of(os.getpid()),
             job=f"slurm {slurm}" if slurm else f"pbs {pbs}" if pbs else "",
             restarts=int(environment.get("SLURM_RESTART_COUNT", "0")),
         )
@@ -153,7 +153,7 @@ def alive(path: Path, holder: Holder | None, me: Holder) -> str:
     if holder.job and holder.job == me.job and holder.restarts < me.restarts:
         return ""
     if holder.host == me.host:
-        same = holder.boot == me.boot and _process_start(holder.process) == holder.process_start
+        same = holder.boot == me.boot and process_start_of(holder.process) == holder.process_start
         return f"{who} is running" if same and holder.process_start else ""
     if silent > SILENCE:
         return ""
@@ -175,7 +175,7 @@ def seconds_since_touched(path: Path) -> float | None:
         probe.unlink(missing_ok=True)
 
 
-def _boot() -> str:
+def boot_identity() -> str:
     """Identity of this boot of the machine, where the system tells it."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
@@ -183,7 +183,7 @@ def _boot() -> str:
         return ""
 
 
-def _process_start(process: int) -> str:
+def process_start_of(process: int) -> str:
     """When a process started, in the system's own ticks; empty if there is no such process."""
     try:
         status = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()

@@ -21,6 +21,7 @@ from etc_engine.errors import EtcError
 COMMANDS = {
     "pack": "etc_engine.cli.pack:pack_command",
     "solve": "etc_engine.cli.solve:solve_command",
+    "homogenize": "etc_engine.cli.homogenize:homogenize_command",
     "sweep": "etc_engine.cli.sweep:sweep_command",
     "compare": "etc_engine.cli.compare:compare_command",
     "report": "etc_engine.cli.report:report_command",
@@ -28,6 +29,10 @@ COMMANDS = {
     "rerun": "etc_engine.cli.rerun:rerun_command",
     "models": "etc_engine.cli.models:models_command",
     "transient": "etc_engine.cli.transient:transient_command",
+    "serve": "etc_engine.cli.serve:serve_command",
+    "submit": "etc_engine.cli.submit:submit_command",
+    "status": "etc_engine.cli.status:status_command",
+    "fetch": "etc_engine.cli.fetch:fetch_command",
 }
 
 EXIT_DONE = 0

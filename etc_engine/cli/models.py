@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from etc_engine.models import Model
 
 
 @click.command("models")
@@ -36,13 +33,14 @@ def models_command(
     from etc_engine.errors import InputError
     from etc_engine.models import CATALOGUE
     from etc_engine.models.catalogue import find_model
+    from etc_engine.models.records import evaluation, record
 
     phases = {"k1": k1, "k2": k2, "fraction": fraction}
     evaluating = bool(settings) or any(value is not None for value in (*phases.values(), dimension))
     if name is None:
         if evaluating:
             raise InputError("which model? give its name: etc-engine models NAME --k1 A --k2 B ...")
-        records = [_record(model) for model in CATALOGUE.values()]
+        records = [record(model) for model in CATALOGUE.values()]
         if as_json:
             print_json({"models": records})
         else:
@@ -50,13 +48,12 @@ def models_command(
         return
     model = find_model(name)
     if not evaluating:
-        record = _record(model)
         if as_json:
-            print_json(record)
+            print_json(record(model))
         else:
-            _print_record(record)
+            _print_record(record(model))
         return
-    result = _evaluated(model, phases, dimension, _parsed(settings))
+    result = evaluation(model, phases, dimension, _parsed(settings), spelling="--{}")
     if as_json:
         print_json(result)
     else:
@@ -77,66 +74,6 @@ def _parsed(settings: tuple[str, ...]) -> dict[str, float]:
         except ValueError:
             raise InputError(f"--set takes NAME=VALUE with a number, such as zeta2=0.1: found {setting!r}") from None
     return parameters
-
-
-def _evaluated(
-    model: Model, phases: dict[str, float | None], dimension: int | None, parameters: dict[str, float]
-) -> dict[str, Any]:
-    from etc_engine.errors import InputError
-    from etc_engine.models import evaluate
-
-    used = {item.name for item in model.inputs}
-    missing = [f"--{key}" for key, value in phases.items() if value is None and key in used]
-    if dimension is None:
-        if len(model.dimensions) > 1:
-            missing.append("--dimension")
-        dimension = model.dimensions[0]
-    if missing:
-        raise InputError(f"model {model.name} also needs {' '.join(missing)}")
-    # An input that the model has no use for may be left out; 0 then fills its place in the call.
-    filled = {key: 0.0 if value is None else value for key, value in phases.items()}
-    k = evaluate(
-        model.name,
-        k1=filled["k1"],
-        k2=filled["k2"],
-        fraction=filled["fraction"],
-        dimension=dimension,
-        **parameters,
-    )
-    given = {key: value for key, value in phases.items() if value is not None}
-    return {
-        "model": model.name,
-        "conductivity": float(k),
-        "dimension": dimension,
-        "kind": model.kind,
-        **given,
-        "parameters": parameters,
-        "reference": model.reference,
-    }
-
-
-def _record(model: Model) -> dict[str, Any]:
-    defaults = model.defaults
-    return {
-        "model": model.name,
-        "title": model.title,
-        "dimensions": list(model.dimensions),
-        "kind": model.kind,
-        "inputs": [
-            {
-                "name": item.name,
-                "meaning": item.meaning,
-                "unit": item.unit,
-                "allowed": str(item.interval),
-                "required": item.name not in defaults,
-                "default": defaults.get(item.name),
-            }
-            for item in model.inputs
-        ],
-        "validity": model.validity,
-        "limits": model.limits,
-        "reference": model.reference,
-    }
 
 
 def _print_list(records: list[dict[str, Any]]) -> None:

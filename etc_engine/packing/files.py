@@ -24,10 +24,13 @@ class ParticleTable:
     packing : ParticlePacking
     conductivity : ndarray, shape (n,) [W/(m K)], or None
         Conductivity of each particle, where the file gives it.
+    ids : ndarray of int64, shape (n,), or None
+        Number by which the file names each particle, where it does.
     """
 
     packing: ParticlePacking
     conductivity: NDArray[np.float64] | None = None
+    ids: NDArray[np.int64] | None = None
 
 
 def read_csv(path: Path | str, box: Box) -> ParticleTable:
@@ -99,6 +102,14 @@ def _header(path: Path, dimension: int) -> list[str]:
 
 def _first_bad_row(path: Path, names: list[str]) -> str:
     """What is wrong with a table that could not be read, as one line."""
+    try:
+        return _find_bad_row(path, names) or f"{path} cannot be read as a table of numbers"
+    except (UnicodeDecodeError, csv.Error) as error:
+        return f"{path} cannot be read as a CSV file: {error}"
+
+
+def _find_bad_row(path: Path, names: list[str]) -> str:
+    """What is wrong with the first bad row; empty if there is none."""
     with path.open(encoding="utf-8-sig", newline="") as file:
         rows = csv.reader(file)
         next(rows)
@@ -111,4 +122,4 @@ def _first_bad_row(path: Path, names: list[str]) -> str:
                     float(word)
                 except ValueError:
                     return f"{where}: {name} is not a number: {word!r}"
-    return f"{path} cannot be read as a table of numbers"
+    return ""

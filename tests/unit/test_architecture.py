@@ -17,10 +17,12 @@ ORDER = (
     ("packing",),
     ("contacts", "composite"),
     ("percolation",),
-    ("dtem", "pipe", "lattice", "voxel", "meshless"),
+    ("dtem", "lattice", "voxel", "meshless"),
+    ("pipe",),  # its pipes have the self-resistances of dtem, and store heat in the same areas
     ("effective",),
     ("realization",),
     ("batch",),
+    ("transient",),
     ("results",),
     ("comparison",),
     ("figures",),
@@ -34,6 +36,9 @@ KEEPERS = {
     "matplotlib": {"figures"},
     "pyamg": {"solvers"},
     "click": {"cli"},
+    "fastapi": {"service"},
+    "starlette": {"service"},
+    "uvicorn": {"service/server.py"},
 }
 
 

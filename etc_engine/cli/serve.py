@@ -1,0 +1,74 @@
+"""``etc-engine serve``: studies and single solves over HTTP."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import click
+
+from etc_engine.errors import InputError
+
+
+@click.command("serve")
+@click.option("--data", required=True, type=click.Path(path_type=Path), help="Data directory: queue and results.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; any other needs a token.")
+@click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0 takes a free one.")
+@click.option("--ranks", type=click.IntRange(1), default=1, show_default=True, help="MPI ranks of a study.")
+@click.option("--launcher", type=click.Choice(["local", "slurm"]), default="local", show_default=True)
+@click.option("--sbatch", default="", help="Further options of sbatch, such as '--partition=short --time=2:00:00'.")
+@click.option("--token-file", type=click.Path(path_type=Path), help="File with the token; or ETC_ENGINE_TOKEN.")
+@click.option("--allow-host", "hosts", multiple=True, help="Another name of this service, such as that of a proxy.")
+@click.option("--max-units", type=click.IntRange(1), default=100_000, show_default=True, help="Packings of a study.")
+@click.option("--max-particles", type=click.IntRange(1), default=1_000_000, show_default=True, help="Of a packing.")
+@click.option("--max-memory", type=click.IntRange(256), default=8192, show_default=True, help="Of a rank [MB].")
+@click.option(
+    "--max-hours", type=click.FloatRange(0.0, min_open=True), default=168.0, show_default=True, help="Of a study."
+)
+def serve_command(
+    data: Path,
+    host: str,
+    port: int,
+    ranks: int,
+    launcher: str,
+    sbatch: str,
+    token_file: Path | None,
+    hosts: tuple[str, ...],
+    max_units: int,
+    max_particles: int,
+    max_memory: int,
+    max_hours: float,
+) -> None:
+    """Serve studies and single solves over HTTP, with a web page.
+
+    Studies wait in a queue and run one after the other as `sweep --resume` under mpiexec, or through Slurm. Killed or
+    stopped at any moment, the service goes on where it was when it is started again. Needs the extra 'service'.
+    """
+    try:
+        from etc_engine.service.server import serve
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"the service needs {error.name}: install the extra with pip install 'etc-engine[service]'"
+        ) from None
+    from etc_engine.service.settings import Limits, Settings
+    from etc_engine.service.token import read_token
+
+    limits = Limits(
+        units=max_units,
+        cells=10 * max_units,
+        particles=max_particles,
+        memory_bytes=max_memory * 1024**2,
+        study_seconds=3600.0 * max_hours,
+    )
+    settings = Settings(
+        data=data,
+        host=host,
+        port=port,
+        ranks=ranks,
+        launcher="slurm" if launcher == "slurm" else "local",
+        token=read_token(token_file),
+        hosts=tuple(name.lower() for name in hosts),
+        sbatch=tuple(shlex.split(sbatch)),
+        limits=limits,
+    )
+    serve(settings, lambda address: click.echo(f"etc-engine: serving {data} on {address}", err=True))

@@ -1,0 +1,46 @@
+"""``etc-engine status``: studies of a service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from etc_engine.cli.remote import connect, progress_of, server_options
+
+
+@click.command("status")
+@click.argument("study", required=False)
+@server_options
+@click.option("--cancel", is_flag=True, help="End it; what is finished is kept.")
+@click.option("--resume", is_flag=True, help="Go on with it after it was cancelled or has failed.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def status_command(
+    study: str | None, server: str, token_file: Path | None, cancel: bool, resume: bool, as_json: bool
+) -> None:
+    """Show the queue of a service, or state, progress and log of one STUDY (its identity)."""
+    from etc_engine.cli.options import print_json
+    from etc_engine.service import client
+
+    place = connect(server, token_file)
+    if study is None:
+        if cancel or resume:
+            raise click.UsageError("--cancel and --resume need the identity of a study")
+        found = client.studies(place)
+        if as_json:
+            print_json({"studies": found})
+        else:
+            click.echo("\n".join(map(progress_of, found)) or "no studies")
+        return
+    if cancel and resume:
+        raise click.UsageError("--cancel and --resume exclude each other")
+    if cancel:
+        client.cancel(place, study)
+    if resume:
+        client.resume(place, study)
+    one = client.status(place, study)
+    if as_json:
+        print_json(one)
+    else:
+        click.echo(progress_of(one))
+        click.echo(one["log"], nl=False)

@@ -1,0 +1,62 @@
+"""``etc-engine submit``: hand a study to a service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from etc_engine.cli.remote import connect, progress_of, server_options
+
+EXIT_FAILED_CELLS = 4
+EXIT_RESUMABLE = 75
+
+
+@click.command("submit")
+@click.argument("study", type=click.Path(path_type=Path))
+@server_options
+@click.option("--wait", "waiting", is_flag=True, help="Wait until it has ended.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Wait, and write the result to this netCDF file.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def submit_command(
+    study: Path, server: str, token_file: Path | None, waiting: bool, output: Path | None, as_json: bool
+) -> int:
+    """Hand in STUDY (a TOML file); prints its identity.
+
+    The same study again is answered from the result that is there. With --wait the exit status is that of `sweep`: 0
+    done, 4 done with failed realizations, 75 ended without a result.
+    """
+    from etc_engine.batch.study import read_study
+    from etc_engine.cli.options import check_place, print_json
+    from etc_engine.service import client
+
+    _, text = read_study(study)
+    if output is not None:
+        check_place(output, study)
+    place = connect(server, token_file)
+    found = client.submit(place, text)
+    if waiting or output is not None:
+        found = client.wait(place, found["id"], tell=_Teller().tell)
+        if found["state"] == "done" and output is not None:
+            client.download(place, found["id"], output)
+    if as_json:
+        print_json(found)
+    else:
+        click.echo(progress_of(found))
+    if found["state"] in ("failed", "cancelled") and (waiting or output is not None):
+        return EXIT_RESUMABLE
+    return EXIT_FAILED_CELLS if found["failed_cells"] else 0
+
+
+class _Teller:
+    """Says on stderr what has changed."""
+
+    def __init__(self) -> None:
+        self._said = ""
+
+    def tell(self, found: dict[str, object]) -> None:
+        """Take in a status."""
+        line = progress_of(found)
+        if line != self._said:
+            click.echo(line, err=True)
+        self._said = line

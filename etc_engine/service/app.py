@@ -1,0 +1,362 @@
+"""The HTTP interface: what can be asked, and the errors as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from importlib.resources import files
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, FastAPI, Query, Request
+from fastapi.responses import FileResponse, PlainTextResponse, Response
+from pydantic import AfterValidator
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+
+from etc_engine.batch.provenance import engine_version
+from etc_engine.errors import InputError, StudyError
+from etc_engine.models import CATALOGUE
+from etc_engine.models.catalogue import find_model
+from etc_engine.models.records import evaluation, record
+from etc_engine.packing import METHODS
+from etc_engine.realization import ENGINES
+from etc_engine.service.admission import SOURCE, apply, toml_of
+from etc_engine.service.curve import plain
+from etc_engine.service.guard import Guard
+from etc_engine.service.live import LiveResults, log_tail
+from etc_engine.service.messages import (
+    About,
+    Estimate,
+    Id,
+    Modelled,
+    Solved,
+    StudyList,
+    StudyStatus,
+    StudySummary,
+    Submitted,
+)
+from etc_engine.service.queue import Entry, Queue, State
+from etc_engine.service.refusals import PARTICLES_BODY, REFUSALS, STUDY_BODY, add_refusals
+from etc_engine.service.running import Runner
+from etc_engine.service.settings import Settings
+from etc_engine.service.store import Store
+
+PAGE = {
+    "app.js": "text/javascript",
+    "figure.js": "text/javascript",
+    "style.css": "text/css",
+    "icon.svg": "image/svg+xml",
+}
+REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; frame-ancestors 'none'; sandbox"
+SHOWN_WORDS = (
+    "equal:0.015",
+    "uniform:0.01:0.02",
+    "gaussian:0.015:0.002",
+    "lognormal:0.015:0.002",
+    "bidisperse:0.01:0.02:0.5",
+)
+
+
+@dataclass(frozen=True)
+class Service:
+    """What the requests work on."""
+
+    settings: Settings
+    store: Store
+    queue: Queue
+    live: LiveResults
+    runner: Runner
+    wake: Callable[[], None]
+    changing: threading.Lock = field(default_factory=threading.Lock)
+
+
+def _finite(value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise ValueError(f"found {value}, expected a finite number")
+    return value
+
+
+Finite = Annotated[float | None, AfterValidator(_finite)]
+
+api = APIRouter(prefix="/api", responses=REFUSALS)
+page = APIRouter(include_in_schema=False)
+
+
+def make_app(service: Service) -> Guard:
+    """The application, behind its guard."""
+    app = FastAPI(
+        title="etc_engine",
+        description="Effective thermal conductivity of particle systems: studies, single solves and models.",
+        version=engine_version(),
+        docs_url=None,
+        redoc_url=None,
+    )
+    app.state.service = service
+    app.include_router(page)
+    app.include_router(api)
+    add_refusals(app)
+    return Guard(app, service.settings)
+
+
+def _service(request: Request) -> Service:
+    found: Service = request.app.state.service
+    return found
+
+
+def _entry(request: Request, study: str) -> Entry:
+    entry = _service(request).queue.get(study)
+    if entry is None:
+        raise HTTPException(404, f"there is no study {study}")
+    return entry
+
+
+@api.get("/service")
+def about(request: Request) -> About:
+    """Version, launcher, limits and the words that a study can use."""
+    service = _service(request)
+    return About(
+        engine=engine_version(),
+        launcher=service.settings.launcher,
+        ranks=service.settings.ranks,
+        limits=asdict(service.settings.limits),
+        queued=service.queue.count("queued"),
+        running=service.queue.count("running"),
+        packing_methods=list(METHODS),
+        size_distributions=list(SHOWN_WORDS),
+        conduction_methods={name: list(engine.methods) for name, engine in ENGINES.items()},
+    )
+
+
+@api.get("/studies")
+async def list_studies(
+    request: Request,
+    state: State | None = None,
+    limit: Annotated[int, Query(ge=1, le=10_000)] = 1000,
+    offset: Annotated[int, Query(ge=0, le=10**9)] = 0,
+) -> StudyList:
+    """The queue, the newest studies first."""
+    queue = _service(request).queue
+    entries = queue.entries(state, limit, offset)
+    summaries = [StudySummary.of(entry) for entry in entries]
+    return StudyList.model_construct(studies=summaries, total=queue.count(state))
+
+
+@api.post("/studies", status_code=201, openapi_extra=STUDY_BODY, responses={200: {"model": Submitted}})
+async def submit_study(request: Request, response: Response) -> Submitted:
+    """Hand in a study. The same study again is answered from the one that is there (200)."""
+    text = await _study_text(request)
+    entry, new = await run_in_threadpool(_submit, _service(request), text)
+    response.status_code = 201 if new else 200
+    return Submitted(**StudySummary.of(entry).model_dump(), new=new)
+
+
+@api.post("/studies/check", openapi_extra=STUDY_BODY)
+async def check_study(request: Request) -> Estimate:
+    """Check a study and tell its size, without running it."""
+    service = _service(request)
+    found = await run_in_threadpool(apply, await _study_text(request), service.settings.limits)
+    return Estimate(
+        id=found.id,
+        name=found.study.name,
+        known=service.queue.get(found.id) is not None,
+        units=found.units,
+        most=found.most,
+        cells=found.cells,
+        particles=found.particles,
+        text=found.text,
+    )
+
+
+@api.get("/studies/{study}")
+async def study_status(request: Request, study: Id) -> StudyStatus:
+    """State, progress and the end of the log."""
+    entry = _entry(request, study)
+    tail = log_tail(_service(request).store.log(study))
+    return StudyStatus.model_construct(**dict(StudySummary.of(entry)), log=tail)
+
+
+@api.delete("/studies/{study}", status_code=204)
+def remove_study(request: Request, study: Id) -> None:
+    """Forget a study and all its files; one that runs has to be cancelled first."""
+    service = _service(request)
+    _entry(request, study)
+    with service.changing:
+        if not service.queue.remove(study):
+            raise HTTPException(409, "the study is running: cancel it first")
+        service.store.remove(study)
+    service.live.forget(study)
+
+
+@api.post("/studies/{study}/cancel")
+def cancel_study(request: Request, study: Id) -> StudySummary:
+    """End a study that waits or runs; what is finished is kept, and resume goes on with it."""
+    service = _service(request)
+    entry = _entry(request, study)
+    if not service.queue.cancel(study):
+        raise HTTPException(409, f"the study is {entry.state}: only one that waits or runs can be cancelled")
+    service.wake()
+    return StudySummary.of(_entry(request, study))
+
+
+@api.post("/studies/{study}/resume")
+def resume_study(request: Request, study: Id) -> StudySummary:
+    """Put a cancelled or failed study back in the queue; it goes on where it stopped."""
+    service = _service(request)
+    entry = _entry(request, study)
+    if not service.queue.resume(study):
+        raise HTTPException(409, f"the study is {entry.state}: only one that was cancelled or failed can be resumed")
+    service.wake()
+    return StudySummary.of(_entry(request, study))
+
+
+@api.get("/studies/{study}/study.toml", response_class=PlainTextResponse)
+def study_text(request: Request, study: Id) -> PlainTextResponse:
+    """The study as it was handed in."""
+    _entry(request, study)
+    text = _service(request).store.study_file(study).read_text(encoding="utf-8")
+    return PlainTextResponse(text, media_type="text/plain; charset=utf-8")
+
+
+@api.get("/studies/{study}/curve", responses={200: {"content": {"application/json": {}}}})
+def study_curve(request: Request, study: Id) -> Response:
+    """Conductivity over density with confidence intervals and models: complete, or of the realizations so far."""
+    _entry(request, study)
+    return Response(_service(request).live.curve(study), media_type="application/json")
+
+
+@api.get("/studies/{study}/result.nc", response_class=FileResponse)
+def study_result(request: Request, study: Id) -> FileResponse:
+    """The result as netCDF."""
+    name = f"{_finished(request, study)}.nc"
+    return FileResponse(_service(request).store.result(study), media_type="application/x-netcdf", filename=name)
+
+
+@api.get("/studies/{study}/report.html", response_class=FileResponse)
+def study_report(request: Request, study: Id) -> FileResponse:
+    """The report as one HTML page; it is made when it is first asked for."""
+    name = f"{_finished(request, study)}.html"
+    report = _service(request).runner.report(study)
+    headers = {"content-security-policy": REPORT_POLICY}
+    return FileResponse(report, media_type="text/html", filename=name, headers=headers)
+
+
+@api.post("/solve", openapi_extra=PARTICLES_BODY)
+async def solve(
+    request: Request,
+    box: Annotated[str | None, Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, such as 1,1")] = None,
+    periodic: Annotated[str | None, Query(pattern="^[xyz]{0,3}$")] = None,
+    frame: Annotated[int | None, Query(ge=-(10**9), le=10**9)] = None,
+    method: Annotated[str, Query(pattern="^[a-z]{1,20}$")] = "chord",
+    modes: Annotated[int | None, Query(ge=1, le=30)] = None,
+    contact_angle: Annotated[Finite, Query(description="half-angle in degrees of bonded contacts")] = None,
+    bond_gap: Annotated[Finite, Query(description="largest bonded gap, in mean radii")] = None,
+    conductivity: Annotated[Finite, Query(description="of the particles [W/(m K)]")] = None,
+    contact_resistance: Annotated[Finite, Query(description="of a contact [m K/W]")] = None,
+) -> Solved:
+    """Effective conductivity of the particles in the body; the options are those of ``etc-engine solve``."""
+    given = {
+        "box": box,
+        "periodic": periodic,
+        "frame": frame,
+        "method": method,
+        "modes": modes,
+        "contact-angle": contact_angle,
+        "bond-gap": bond_gap,
+        "conductivity": conductivity,
+        "contact-resistance": contact_resistance,
+    }
+    options = [f"--{name}={value}" for name, value in given.items() if value is not None]
+    particles = await request.body()
+    answer = await run_in_threadpool(_service(request).runner.solve, particles, options)
+    return Solved.model_validate(answer)
+
+
+@api.get("/models")
+def list_models() -> dict[str, list[dict[str, Any]]]:
+    """The catalogue of conductivity models."""
+    return {"models": [_plain_record(record(model)) for model in CATALOGUE.values()]}
+
+
+@api.get("/models/{name}")
+def describe_model(name: str) -> dict[str, Any]:
+    """One model: inputs, validity, limits, reference."""
+    return _plain_record(record(_model(name)))
+
+
+@api.post("/models/{name}")
+def evaluate_model(name: str, inputs: Modelled) -> dict[str, Any]:
+    """The conductivity by a model; null where it is infinite."""
+    phases = {"k1": inputs.k1, "k2": inputs.k2, "fraction": inputs.fraction}
+    return _plain_record(evaluation(_model(name), phases, inputs.dimension, inputs.parameters))
+
+
+@page.get("/")
+def front_page() -> Response:
+    """The web page."""
+    return Response(files(__package__).joinpath("page/index.html").read_bytes(), media_type="text/html; charset=utf-8")
+
+
+@page.get("/page/{name}")
+def page_file(name: Literal["app.js", "figure.js", "style.css", "icon.svg"]) -> Response:
+    """A part of the web page."""
+    return Response(files(__package__).joinpath("page", name).read_bytes(), media_type=PAGE[name])
+
+
+def _finished(request: Request, study: str) -> str:
+    """The id as a file name, of a study that is done."""
+    entry = _entry(request, study)
+    if entry.state != "done":
+        raise HTTPException(409, f"the study is {entry.state}: its result is there when it is done")
+    return study
+
+
+def _submit(service: Service, text: str) -> tuple[Entry, bool]:
+    """Check a study, keep its text, put it in the queue: so the queue never names what is not there.
+
+    One that was cancelled or has failed goes on.
+    """
+    found = apply(text, service.settings.limits)
+    with service.changing:
+        known = service.queue.get(found.id)
+        if known is None:
+            service.store.save_study(found.id, text)
+        elif known.state in ("cancelled", "failed"):
+            service.queue.resume(found.id)
+        entry, new = service.queue.submit(found.id, found.study.name, found.units, found.most)
+    service.wake()
+    return entry, new
+
+
+async def _study_text(request: Request) -> str:
+    """The body of a request as the text of a study file."""
+    try:
+        text = (await request.body()).decode("utf-8")
+    except UnicodeDecodeError:
+        raise StudyError(f"{SOURCE}: is not text in UTF-8") from None
+    if "json" not in request.headers.get("content-type", ""):
+        return text
+    try:
+        values = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise StudyError(f"{SOURCE}: is not valid JSON: {error}") from None
+    if not isinstance(values, dict):
+        raise StudyError(f"{SOURCE}: expected a JSON object, found {type(values).__name__}")
+    return toml_of(values)
+
+
+def _model(name: str) -> Any:
+    try:
+        return find_model(name)
+    except InputError as error:
+        raise HTTPException(404, str(error)) from None
+
+
+def _plain_record(values: Any) -> Any:
+    if isinstance(values, dict):
+        return {key: _plain_record(value) for key, value in values.items()}
+    if isinstance(values, list):
+        return [_plain_record(value) for value in values]
+    return plain(values)

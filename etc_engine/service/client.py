@@ -1,0 +1,229 @@
+"""The client: a few functions that speak to the service and answer datasets; the standard library is all they need.
+
+::
+
+    from etc_engine.service.client import Server, fetch, submit, wait
+
+    server = Server("http://127.0.0.1:8765")
+    study = submit(server, open("study.toml").read())
+    wait(server, study["id"])
+    print(fetch(server, study["id"]).conductivity_mean)
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from http.client import HTTPException
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from etc_engine.errors import InputError, OutputError
+
+if TYPE_CHECKING:
+    import xarray
+
+ENDED = ("done", "failed", "cancelled")
+CHUNK = 1 << 20
+Told = Callable[[dict[str, Any]], None]
+
+
+@dataclass(frozen=True)
+class Server:
+    """Where the service is, and what it wants to see.
+
+    Parameters
+    ----------
+    url : str
+        Such as ``http://127.0.0.1:8765``.
+    token : str
+        Empty where the service asks for none. It travels in the header Authorization: over http anyone on the way
+        can read it, so use https beyond this machine.
+    timeout : float [s]
+    """
+
+    url: str
+    token: str = field(default="", repr=False)
+    timeout: float = 60.0
+
+    def __post_init__(self) -> None:
+        parts = urllib.parse.urlsplit(self.url)
+        if parts.scheme not in ("http", "https") or not parts.hostname or parts.username or parts.query:
+            raise InputError(f"server {self.url!r}: expected an address such as http://127.0.0.1:8765")
+
+
+def submit(server: Server, study: str | Mapping[str, Any]) -> dict[str, Any]:
+    """Hand in a study: the text of a study file, or the same as a mapping. Answers its status, with its ``id``.
+
+    Raises
+    ------
+    InputError
+        If the service refuses it, in the service's words.
+    OutputError
+        If the service cannot be reached or fails.
+    """
+    if isinstance(study, str):
+        return _json(server, "POST", "/api/studies", study.encode(), "application/toml")
+    return _json(server, "POST", "/api/studies", json.dumps(study).encode(), "application/json")
+
+
+def status(server: Server, study: str) -> dict[str, Any]:
+    """State, progress and the end of the log of a study."""
+    return _json(server, "GET", f"/api/studies/{_safe(study)}")
+
+
+def studies(server: Server) -> list[dict[str, Any]]:
+    """All studies, the newest first."""
+    found: list[dict[str, Any]] = _json(server, "GET", "/api/studies?limit=10000")["studies"]
+    return found
+
+
+def wait(server: Server, study: str, *, tell: Told | None = None, interval: float = 2.0) -> dict[str, Any]:
+    """Wait until a study is done, failed or cancelled; ``tell`` is called with every status on the way."""
+    while True:
+        found = status(server, study)
+        if tell is not None:
+            tell(found)
+        if found["state"] in ENDED:
+            return found
+        time.sleep(interval)
+
+
+def cancel(server: Server, study: str) -> dict[str, Any]:
+    """End a study; what is finished is kept."""
+    return _json(server, "POST", f"/api/studies/{_safe(study)}/cancel", b"")
+
+
+def resume(server: Server, study: str) -> dict[str, Any]:
+    """Go on with a cancelled or failed study."""
+    return _json(server, "POST", f"/api/studies/{_safe(study)}/resume", b"")
+
+
+def fetch(server: Server, study: str, output: Path | None = None) -> xarray.Dataset:
+    """The result of a study that is done, as a dataset; with ``output`` also as a netCDF file.
+
+    Raises
+    ------
+    InputError
+        If the study is not done.
+    OutputError
+        If the file cannot be written.
+    """
+    from etc_engine.batch.dataset import open_dataset
+
+    if output is not None:
+        download(server, study, output)
+        return open_dataset(output)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "result.nc"
+        download(server, study, path)
+        return open_dataset(path)
+
+
+def download(server: Server, study: str, output: Path, part: str = "result.nc") -> None:
+    """Write the result (or ``report.html``) of a study to a file, whole or not at all."""
+    draft = output.with_name(f".{output.name}.{os.getpid()}.tmp")
+    try:
+        with _open(server, "GET", f"/api/studies/{_safe(study)}/{part}") as answer:
+            expected = int(answer.headers.get("content-length", -1))  # type: ignore[attr-defined]
+            with draft.open("wb") as file:
+                while block := answer.read(CHUNK):
+                    file.write(block)
+                length = file.tell()
+        if expected not in (-1, length):
+            raise OutputError(f"{server.url} broke off after {length} of {expected} bytes: try again")
+        draft.replace(output)
+    except OSError as error:
+        raise OutputError(f"cannot write {output}: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
+
+
+def solve(server: Server, particles: bytes, **options: Any) -> dict[str, Any]:
+    """Conductivity of the particles in a CSV file or a dump, given as its bytes.
+
+    The options are those of ``etc-engine solve``, with underscores: ``box="1,1"``, ``contact_angle=5.0``, ...
+    """
+    query = urllib.parse.urlencode({key: value for key, value in options.items() if value is not None})
+    return _json(server, "POST", f"/api/solve?{query}", particles, "application/octet-stream", timeout=600.0)
+
+
+def models(server: Server) -> list[dict[str, Any]]:
+    """The catalogue of conductivity models."""
+    found: list[dict[str, Any]] = _json(server, "GET", "/api/models")["models"]
+    return found
+
+
+def evaluate(server: Server, model: str, **inputs: Any) -> dict[str, Any]:
+    """The conductivity by a model: ``k1``, ``k2``, ``fraction``, ``dimension`` and its further inputs by name."""
+    common = {key: inputs.pop(key) for key in ("k1", "k2", "fraction", "dimension") if key in inputs}
+    values = {key: str(value) if value in (float("inf"),) else value for key, value in common.items()}
+    body = json.dumps({**values, "parameters": inputs}).encode()
+    return _json(server, "POST", f"/api/models/{_safe(model)}", body, "application/json")
+
+
+def _safe(word: str) -> str:
+    return urllib.parse.quote(word, safe="")
+
+
+def _json(
+    server: Server, method: str, path: str, body: bytes | None = None, kind: str = "", timeout: float | None = None
+) -> dict[str, Any]:
+    with _open(server, method, path, body, kind, timeout) as answer:
+        try:
+            values = json.load(answer)
+        except (ValueError, OSError, HTTPException):
+            values = None
+    if not isinstance(values, dict):
+        raise OutputError(f"{server.url} does not answer as an etc-engine service: is the address right?")
+    return values
+
+
+def _open(
+    server: Server, method: str, path: str, body: bytes | None = None, kind: str = "", timeout: float | None = None
+) -> IO[bytes]:
+    """An answer, to be closed; refusals and failures are raised."""
+    headers = {"Accept": "application/json, */*"}
+    if kind:
+        headers["Content-Type"] = kind
+    if server.token:
+        headers["Authorization"] = f"Bearer {server.token}"
+    request = urllib.request.Request(server.url.rstrip("/") + path, body, headers, method=method)
+    opener = urllib.request.build_opener(_NoRedirect)
+    try:
+        answer: IO[bytes] = opener.open(request, timeout=timeout or server.timeout)
+    except urllib.error.HTTPError as error:
+        with error:
+            reason = _reason(error)
+        if 400 <= error.code < 500:
+            raise InputError(reason) from None
+        raise OutputError(reason) from None
+    except (OSError, HTTPException, ValueError) as error:
+        why = getattr(error, "reason", None) or error
+        why = getattr(why, "strerror", None) or why
+        raise OutputError(f"{server.url} does not answer ({why}): is the service running there?") from None
+    return answer
+
+
+def _reason(error: urllib.error.HTTPError) -> str:
+    try:
+        values = json.load(error)
+        return str(values["error"])
+    except (ValueError, KeyError, TypeError, OSError):
+        return f"the server answers {error.code} {error.reason}: is the address right?"
+
+
+class _NoRedirect(urllib.request.HTTPRedirectHandler):
+    """A redirect would carry the token to another place."""
+
+    def redirect_request(self, *_: Any) -> None:
+        """Follow none: the answer counts as an error."""

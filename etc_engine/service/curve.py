@@ -1,0 +1,119 @@
+"""The numbers of the figure: conductivity over density with confidence intervals, and the models beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.comparison import evaluate_models, model_lines
+from etc_engine.comparison.simulation import simulated
+from etc_engine.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
+    """Mean conductivity, Student-t interval and count of every cell, and the models, as plain JSON values.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of a sweep, complete or not.
+
+    Returns
+    -------
+    dict
+        ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``, each with ``contact_angle``
+        [degree], ``method``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities; ``models`` with
+        their lines, ``remark`` where there are none, ``bounds_broken``. A number that is not there is None.
+    """
+    units = int((dataset["worker_rank"].values >= 0).sum())
+    found: dict[str, Any] = {"units": units, "confidence": float(dataset.attrs["confidence_level"])}
+    found["density"] = plain(dataset["density"].values)
+    found |= {"series": [], "models": [], "solid_fraction": [], "remark": "", "bounds_broken": False}
+    if not units:
+        return found
+    statistics = simulated(dataset)
+    found["solid_fraction"] = plain(_over_density(statistics["solid_fraction"]))
+    found["series"] = [_series(statistics.isel(place)) for place in _places(statistics)]
+    try:
+        comparison = evaluate_models(dataset)
+    except InputError as error:
+        found["remark"] = str(error)
+        return found
+    found["models"] = _models(comparison)
+    found["bounds_broken"] = bool(comparison.attrs["bound_broken"])
+    found["best_model"] = str(comparison.attrs["best_model"])
+    return found
+
+
+def _places(statistics: xarray.Dataset) -> list[dict[str, int]]:
+    """One index for every curve."""
+    names = [name for name in ("contact_angle", "method") if name in statistics["conductivity_mean"].dims]
+    sizes = [statistics.sizes[name] for name in names]
+    return [dict(zip(names, place, strict=True)) for place in np.ndindex(*sizes)]
+
+
+def _series(cell: xarray.Dataset) -> dict[str, Any]:
+    angle, method = cell.coords.get("contact_angle"), cell.coords.get("method")
+    return {
+        "contact_angle": None if angle is None else float(angle),
+        "method": None if method is None else str(method.values),
+        "mean": plain(cell["conductivity_mean"].values),
+        "low": plain(cell["conductivity_ci_low"].values),
+        "high": plain(cell["conductivity_ci_high"].values),
+        "count": cell["count"].values.tolist(),
+    }
+
+
+def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
+    """Every model: a smooth line, and how far it is from the simulation."""
+    lines = model_lines(comparison)
+    drawn = {str(name): lines["model_conductivity"].sel(model=name).values for name in lines["model"].values}
+    found = []
+    for name in comparison["model"].values:
+        one = comparison.sel(model=name)
+        value = one["model_conductivity"]
+        if str(name) in drawn:
+            density, curves = lines["density"].values, [drawn[str(name)]]
+        else:  # the contact mean field: values on the sweep only, a curve for every angle and method
+            density = comparison["density"].values
+            curves = [_over_density(value.isel(place)) for place in _places(comparison)]
+        squares = np.asarray(one["rms_relative_difference"].values, dtype=np.float64) ** 2
+        found.append(
+            {
+                "name": str(name),
+                "title": str(one["model_title"].values),
+                "kind": str(one["model_kind"].values),
+                "note": str(one["model_note"].values),
+                "density": plain(density),
+                "curves": [plain(curve) for curve in curves],
+                "rms_relative_difference": plain(np.sqrt(squares.mean())),
+            }
+        )
+    return found
+
+
+def _over_density(values: xarray.DataArray) -> NDArray[np.float64]:
+    """The first curve of an array that may have one for every angle and method."""
+    other = {name: 0 for name in values.dims if name != "density"}
+    return np.asarray(values.isel(other).values, dtype=np.float64)
+
+
+def plain(values: Any) -> Any:
+    """Numbers for JSON: lists, and None for what is not finite.
+
+    Examples
+    --------
+    >>> plain(np.array([1.0, np.nan]))
+    [1.0, None]
+    """
+    if isinstance(values, np.ndarray | np.generic):
+        values = values.tolist()
+    if isinstance(values, list):
+        return [plain(value) for value in values]
+    return None if isinstance(values, float) and not math.isfinite(values) else values

@@ -1,0 +1,223 @@
+"""Launchers: how a batch is started, watched and ended, on this machine or through Slurm."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from etc_engine.errors import OutputError
+from etc_engine.service.processes import ProcessIdentity, kill_batch
+from etc_engine.service.settings import Settings
+from etc_engine.service.store import Store
+
+HELD = 'ulimit -d "$1" 2>/dev/null; shift; exec "$@"'
+"""Holds the memory of what follows (in kilobytes) and becomes it."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A batch that has ended; ``status`` is its exit status where it can be known."""
+
+    status: int | None = None
+
+
+class Launcher(Protocol):
+    """What the supervisor needs to know of the place where batches run."""
+
+    concurrent: int
+    """Batches at a time."""
+    outlives: bool
+    """Whether batches go on when the service stops."""
+
+    @property
+    def interval(self) -> float:
+        """Seconds between two looks at a batch."""
+
+    def start(self, study: str) -> str:
+        """Start the batch of a study; answers how it is found again."""
+
+    def find(self, study: str) -> str:
+        """A batch that was started by a service which could not note it any more; empty if there is none."""
+
+    def look(self, study: str, batch: str) -> Ended | None:
+        """None while the batch runs or waits for its machines."""
+
+    def stop(self, study: str, batch: str) -> None:
+        """Ask a batch to end; it keeps what is finished."""
+
+    def kill(self, study: str, batch: str) -> None:
+        """End a batch and all that is left of it."""
+
+
+@dataclass
+class LocalLauncher:
+    """``mpiexec`` on this machine, one batch at a time; without an mpiexec a single process."""
+
+    store: Store
+    settings: Settings
+    concurrent: int = 1
+    interval: float = 0.1
+    outlives: bool = False
+    _children: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+
+    def command(self, study: str) -> list[str]:
+        """The command line of a batch."""
+        words = [*self.settings.engine, "sweep", str(self.store.study_file(study))]
+        words += ["-o", str(self.store.result(study)), "--resume"]
+        launcher = find_mpiexec() if self.settings.ranks > 1 else None
+        return [launcher, "-n", str(self.settings.ranks), *words] if launcher else words
+
+    def start(self, study: str) -> str:
+        """Start it in a session of its own, so that signals to the service do not reach it."""
+        kill_batch(self.store.result(study))
+        kilobytes = str(self.settings.limits.memory_bytes // 1024)
+        with self.store.log(study).open("ab") as log:
+            child = subprocess.Popen(
+                ["/bin/sh", "-c", HELD, "sh", kilobytes, *self.command(study)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                cwd=self.store.folder(study),
+                env=batch_environment(),
+            )
+        self._children[study] = child
+        return json.dumps(asdict(ProcessIdentity.of(child.pid)))
+
+    def find(self, study: str) -> str:  # noqa: ARG002 - the protocol's signature
+        """Nothing: `start` ends what was not noted."""
+        return ""
+
+    def look(self, study: str, batch: str) -> Ended | None:
+        """A child tells its exit status; a batch that an earlier service started only that it has ended."""
+        child = self._children.get(study)
+        if child is not None:
+            status = child.poll()
+            if status is None:
+                return None
+            del self._children[study]
+            return Ended(status)
+        return None if batch and _identity(batch).alive else Ended()
+
+    def stop(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature
+        """SIGTERM to the launcher, which hands it on to every rank."""
+        if batch:
+            _identity(batch).signal(signal.SIGTERM)
+
+    def kill(self, study: str, batch: str) -> None:
+        """SIGKILL to everything that computes this result."""
+        kill_batch(self.store.result(study))
+        if batch:
+            _identity(batch).signal(signal.SIGKILL)
+        child = self._children.get(study)
+        if child is not None:
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(timeout=10.0)
+
+
+@dataclass
+class SlurmLauncher:
+    """``sbatch`` with the script of ``jobs/``; the service, not the script, queues a stopped job again."""
+
+    store: Store
+    settings: Settings
+    concurrent: int = 16
+    outlives: bool = True
+
+    @property
+    def interval(self) -> float:
+        """As the settings say: a controller is shared by many."""
+        return self.settings.squeue_seconds
+
+    def start(self, study: str) -> str:
+        """Write the script beside the study and submit it; answers the number of the job."""
+        folder = self.store.folder(study)
+        shutil.copyfile(slurm_script(), folder / "slurm.sh")
+        options = [f"--ntasks={self.settings.ranks}", f"--job-name={_job_name(study)}", f"--chdir={folder}"]
+        options += [f"--output={self.store.log(study)}", *self.settings.sbatch]
+        line = ["sbatch", "--parsable", *options, str(folder / "slurm.sh")]
+        line += [str(self.store.study_file(study)), str(self.store.result(study))]
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+        printed = _ask(line, {**batch_environment(), "PATH": path, "ETC_MAX_RESTARTS": "0"})
+        return printed.strip().splitlines()[-1].partition(";")[0]
+
+    def find(self, study: str) -> str:
+        """A job of that name."""
+        printed = _ask(["squeue", "--noheader", f"--name={_job_name(study)}", "--format=%i"])
+        return printed.split()[0] if printed.split() else ""
+
+    def look(self, study: str, batch: str) -> Ended | None:  # noqa: ARG002 - the protocol's signature
+        """Slurm forgets a job some minutes after its end, and then calls its number invalid."""
+        if not batch:
+            return Ended()
+        line = ["squeue", "--noheader", f"--jobs={batch}", "--format=%T"]
+        done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
+        if done.returncode and "invalid job id" not in done.stderr.lower():
+            return None  # the controller does not answer: look again later
+        return None if done.stdout.strip() else Ended()
+
+    def stop(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature
+        """``scancel``: SIGTERM now, SIGKILL after the site's KillWait."""
+        subprocess.run(["scancel", batch], capture_output=True, check=False, timeout=60)
+
+    def kill(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature
+        """``scancel`` again, with SIGKILL."""
+        if batch:
+            subprocess.run(["scancel", "--signal=KILL", batch], capture_output=True, check=False, timeout=60)
+
+
+def make_launcher(store: Store, settings: Settings) -> Launcher:
+    """The launcher that the settings name."""
+    return SlurmLauncher(store, settings) if settings.launcher == "slurm" else LocalLauncher(store, settings)
+
+
+def find_mpiexec() -> str | None:
+    """The mpiexec of this installation, or the first one on the PATH."""
+    beside = Path(sys.executable).with_name("mpiexec")
+    return str(beside) if beside.exists() else shutil.which("mpiexec")
+
+
+def slurm_script() -> Path:
+    """The script of ``jobs/``: in the installed package, or in the source tree."""
+    packed = Path(__file__).with_name("slurm.sh")
+    return packed if packed.exists() else Path(__file__).parents[2] / "jobs" / "slurm.sh"
+
+
+def _job_name(study: str) -> str:
+    return f"etc-engine-{study}"
+
+
+def _identity(batch: str) -> ProcessIdentity:
+    return ProcessIdentity(**json.loads(batch))
+
+
+def batch_environment() -> dict[str, str]:
+    """The environment for batches, which have no use for the token."""
+    return {key: value for key, value in os.environ.items() if key != "ETC_ENGINE_TOKEN"}
+
+
+def _ask(line: Sequence[str], environment: dict[str, str] | None = None) -> str:
+    """What a command of Slurm prints.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be run or refuses.
+    """
+    try:
+        done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60, env=environment)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise OutputError(f"{line[0]} cannot be run: {error}") from None
+    if done.returncode:
+        reason = " ".join(done.stderr.split()) or f"status {done.returncode}"
+        raise OutputError(f"{line[0]} refuses: {reason}")
+    return done.stdout

@@ -1,0 +1,470 @@
+"use strict";
+// The page of the service: it only asks what any client can ask, and writes text, never markup, into the document.
+
+const BUSY_SECONDS = 1.5, IDLE_SECONDS = 4, HIDDEN_SECONDS = 20;
+const $ = id => document.getElementById(id);
+let about = null, catalogue = null, view = { poll: null }, token = sessionStorage.getItem("etc-token") || "";
+let draft = null; // what was typed into the form of a new study, kept while other parts are looked at
+
+function h(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value !== null && value !== undefined) element.setAttribute(name, value);
+  }
+  element.append(...children.flat().filter(child => child !== null && child !== undefined));
+  return element;
+}
+
+class Refusal extends Error {
+  constructor(status, problem) { super(problem.error); this.status = status; this.field = problem.field || ""; }
+}
+
+async function ask(path, options = {}) {
+  const headers = { ...options.headers };
+  if (token) headers.Authorization = `Bearer ${token}`;
+  let answer;
+  try { answer = await fetch(path, { ...options, headers }); }
+  catch { throw new Refusal(0, { error: "The service does not answer. This page goes on asking." }); }
+  if (answer.ok) return answer;
+  let problem = { error: `The service answers ${answer.status}.` };
+  try { problem = await answer.json(); } catch { /* not from the service itself */ }
+  if (answer.status === 401) $("token").hidden = false;
+  throw new Refusal(answer.status, problem);
+}
+const get = async path => (await ask(path)).json();
+const post = async (path, body, type) =>
+  (await ask(path, { method: "POST", body, headers: type ? { "Content-Type": type } : {} })).json();
+
+function alarm(text) { $("alarm").textContent = text; $("alarm").hidden = !text; }
+
+$("token").addEventListener("submit", event => {
+  event.preventDefault();
+  token = $("token-word").value.trim();
+  sessionStorage.setItem("etc-token", token);
+  $("token").hidden = true;
+  alarm("");
+  start();
+});
+
+// A download is a link; where a token is needed, the file is fetched first: an address must not carry the token.
+function download(path, label) {
+  if (!token) return h("a", { class: "button", href: path, download: true }, label);
+  return h("button", { onclick: async () => {
+    try {
+      const name = path.split("/").pop();
+      const address = URL.createObjectURL(await (await ask(path)).blob());
+      h("a", { href: address, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(address), 60000);
+    } catch (error) { alarm(error.message); }
+  } }, label);
+}
+
+// ---- the queue
+
+async function refreshQueue() {
+  const { studies, total } = await get("/api/studies?limit=200");
+  const shown = location.hash.replace("#/study/", "");
+  const items = studies.map(study => h("li", {},
+    h("a", { href: `#/study/${study.id}`, "aria-current": study.id === shown ? "page" : null },
+      h("span", { class: "row" }, h("span", { class: "name" }, study.name),
+        h("span", { class: `state ${study.state}` }, stateOf(study))),
+      study.state === "running" || study.state === "queued"
+        ? h("progress", { max: study.planned, value: study.done, "aria-label": `progress of ${study.name}` }) : null,
+      h("span", { class: "row faint" }, h("span", {}, `${study.done} of ${study.planned} packings`)))));
+  const focused = document.activeElement && document.activeElement.closest("#queue") ? document.activeElement.hash : null;
+  $("queue").replaceChildren(...items);
+  if (focused) { const again = $("queue").querySelector(`a[href="${focused}"]`); if (again) again.focus(); }
+  $("queue-empty").hidden = studies.length > 0;
+  $("queue-more").textContent = total > studies.length ? `and ${total - studies.length} older ones` : "";
+  return studies.some(study => study.state === "running" || study.state === "queued");
+}
+const stateOf = study => study.cancelling ? "stopping" : study.state;
+
+// ---- a new study
+
+const FIELDS = [
+  ["Study", [
+    ["name", "Name", "text", "density_angle", ""],
+    ["seed", "Seed", "number", "20261", "the same seed gives the same bits"],
+  ]],
+  ["Packing", [
+    ["packing.method", "Method", "packing", "advancing-front", ""],
+    ["packing.radii", "Radii", "radii", "uniform:0.01:0.02", "a size distribution [m]"],
+    ["packing.box", "Box", "numbers", "1, 1", "edge lengths [m]"],
+    ["packing.periodic", "Periodic axes", "text", "", "such as xy; empty for walls"],
+    ["packing.density", "Density", "numbers", "0.64, 0.70, 0.76", "one or several; empty for the packer's own"],
+    ["packing.count", "Particles", "number", "", "not with advancing-front"],
+  ]],
+  ["Contacts", [
+    ["contacts.rule", "Rule", ["overlap", "bonded", "coordination"], "bonded", ""],
+    ["contacts.contact_angle", "Half-angles", "numbers", "5, 10", "degrees"],
+    ["contacts.bond_gap", "Bond gap", "number", "1e-6", "in mean radii"],
+    ["contacts.coordination", "Mean coordination", "number", "", "neighbours of a particle"],
+  ]],
+  ["Conduction", [
+    ["conduction.engine", "Engine", "engine", "dtem", ""],
+    ["conduction.method", "Method", "method", "chord", ""],
+    ["conduction.conductivity", "Conductivity", "number", "1.0", "of the particles [W/(m K)]"],
+    ["conduction.contact_resistance", "Contact resistance", "number", "0.0", "[m K/W]"],
+  ]],
+  ["Statistics", [
+    ["statistics.realizations", "Realizations", "number", "20", "of every density"],
+    ["statistics.confidence", "Confidence", "number", "0.95", ""],
+    ["statistics.relative_ci", "Relative interval", "number", "", "go on until it is this narrow, such as 0.01"],
+    ["statistics.max_realizations", "Most realizations", "number", "", "with a relative interval"],
+  ]],
+  ["Models to compare with", [
+    ["models.names", "Names", "words", "hashin_shtrikman_upper, effective_medium, contact_mean_field", "see Models"],
+    ["models.pore_conductivity", "Pore conductivity", "number", "0.0", "[W/(m K)]"],
+  ]],
+];
+const RULE_FIELDS = { "contacts.contact_angle": ["bonded", "coordination"], "contacts.bond_gap": ["bonded", "coordination"],
+  "contacts.coordination": ["coordination"] };
+
+const number = word => word.trim() !== "" && Number.isFinite(Number(word)) ? Number(word) : word.trim();
+function valueOf(kind, word) {
+  if (kind === "number") return number(word);
+  if (kind === "numbers") return word.split(",").map(number);
+  if (kind === "words") return word.split(",").map(item => item.trim()).filter(Boolean);
+  return word.trim();
+}
+
+function optionsOf(kind) {
+  if (Array.isArray(kind)) return kind;
+  if (kind === "packing") return about.packing_methods;
+  if (kind === "engine") return Object.keys(about.conduction_methods);
+  if (kind === "method") return about.conduction_methods[draft.values["conduction.engine"]] || [];
+  return null;
+}
+
+function fieldOf([path, label, kind, , hint]) {
+  const id = `field-${path}`, value = draft.values[path], options = optionsOf(kind);
+  const common = { id, name: path, "data-kind": Array.isArray(kind) ? "text" : kind, "aria-describedby": `${id}-hint ${id}-error`,
+    autocomplete: "off", spellcheck: "false" };
+  const control = options
+    ? h("select", common, options.map(option => h("option", { value: option, selected: option === value }, option)))
+    : h("input", { ...common, value, list: kind === "radii" ? "radii-words" : null, inputmode: kind === "number" ? "decimal" : null });
+  return h("div", { class: "field", "data-field": path }, h("label", { for: id }, label), control,
+    h("p", { class: "hint", id: `${id}-hint` }, hint), h("p", { class: "error", id: `${id}-error` }));
+}
+
+function studyOf(values) {
+  const study = { schema: 1 };
+  for (const [, fields] of FIELDS) for (const [path, , kind] of fields) {
+    const word = values[path], [table, key] = path.split(".");
+    const rules = RULE_FIELDS[path];
+    if (word.trim() === "" || (rules && !rules.includes(values["contacts.rule"]))) continue;
+    const value = valueOf(kind, word);
+    if (key) (study[table] = study[table] || {})[key] = value; else study[table] = value;
+  }
+  return study;
+}
+
+function tomlOf(study) {
+  const word = value => typeof value === "string" ? JSON.stringify(value)
+    : Array.isArray(value) ? `[${value.map(word).join(", ")}]` : String(value);
+  const lines = [], tables = [];
+  for (const [key, value] of Object.entries(study)) {
+    if (typeof value === "object" && !Array.isArray(value))
+      tables.push("", `[${key}]`, ...Object.entries(value).map(([name, item]) => `${name} = ${word(item)}`));
+    else lines.push(`${key} = ${word(value)}`);
+  }
+  return [...lines, ...tables, ""].join("\n");
+}
+
+function newStudy() {
+  if (!draft) {
+    const values = {};
+    for (const [, fields] of FIELDS) for (const [path, , , value] of fields) values[path] = value;
+    draft = { mode: "form", values, text: "" };
+  }
+  const body = h("form", { novalidate: true });
+  const size = h("p", { class: "size faint", id: "size", "aria-live": "polite" });
+  const general = h("p", { class: "error", id: "study-error", role: "alert" });
+  const tab = (mode, label) => h("button", { type: "button", role: "tab", id: `tab-${mode}`, "aria-selected": draft.mode === mode ? "true" : "false",
+    onclick: () => { if (mode === "text" && draft.mode === "form") draft.text = tomlOf(studyOf(draft.values)); draft.mode = mode; newStudy(); } }, label);
+  const read = () => draft.mode === "text" ? [draft.text, "application/toml"] : [JSON.stringify(studyOf(draft.values)), "application/json"];
+  let timer = null, asked = 0;
+
+  function tell(error) {
+    for (const element of body.querySelectorAll("[aria-invalid]")) element.removeAttribute("aria-invalid");
+    for (const element of body.querySelectorAll(".field .error")) element.textContent = "";
+    general.textContent = "";
+    if (!error) return;
+    size.textContent = "";
+    const words = error.message.replace(/^study: /, "");
+    const control = error.field && body.querySelector(`[name="${CSS.escape(error.field)}"]`);
+    if (control) {
+      control.setAttribute("aria-invalid", "true");
+      $(`field-${error.field}-error`).textContent = words;
+    } else {
+      general.textContent = words;
+      const text = $("study-text");
+      if (text) text.setAttribute("aria-invalid", "true");
+    }
+  }
+  async function check() {
+    const mine = ++asked;
+    try {
+      const found = await post("/api/studies/check", ...read());
+      if (mine !== asked) return;
+      tell(null);
+      const packings = found.most > found.units ? `${found.units} to ${found.most} packings` : `${found.units} packings`;
+      size.textContent = `${packings}, ${found.cells} results, about ${Math.round(found.particles)} particles in the densest packing` +
+        (found.known ? "; this very study is there already" : "");
+    } catch (error) { if (mine === asked) tell(error); }
+  }
+  function changed() { clearTimeout(timer); timer = setTimeout(check, 350); }
+
+  if (draft.mode === "form") {
+    body.append(...FIELDS.map(([title, fields]) => h("fieldset", {}, h("legend", {}, title), h("div", { class: "fields" }, fields.map(fieldOf)))),
+      h("datalist", { id: "radii-words" }, about.size_distributions.map(word => h("option", { value: word }))));
+    const hide = () => { for (const [path, rules] of Object.entries(RULE_FIELDS))
+      body.querySelector(`[data-field="${path}"]`).hidden = !rules.includes(draft.values["contacts.rule"]); };
+    body.addEventListener("input", event => {
+      draft.values[event.target.name] = event.target.value;
+      if (event.target.name === "conduction.engine") { draft.values["conduction.method"] = about.conduction_methods[event.target.value][0]; newStudy(); }
+      hide();
+      changed();
+    });
+    hide();
+  } else {
+    const text = h("textarea", { id: "study-text", spellcheck: "false", "aria-describedby": "study-error", "aria-label": "Study as TOML" });
+    text.value = draft.text;
+    text.addEventListener("input", () => { draft.text = text.value; changed(); });
+    body.append(text);
+  }
+  body.append(general, size, h("div", { class: "buttons" }, h("button", { class: "main", id: "submit" }, "Submit study")));
+  body.addEventListener("submit", async event => {
+    event.preventDefault();
+    clearTimeout(timer);
+    try {
+      const found = await post("/api/studies", ...read());
+      location.hash = `#/study/${found.id}`;
+    } catch (error) {
+      asked++;
+      tell(error);
+      const wrong = body.querySelector("[aria-invalid]");
+      if (wrong) wrong.focus();
+    }
+  });
+  show(h("h1", {}, "New study"),
+    h("p", { class: "faint" }, "Many random packings, the effective conductivity of each, and the mean with its confidence interval."),
+    h("div", { class: "tabs", role: "tablist", "aria-label": "How to write the study" }, tab("form", "Form"), tab("text", "TOML text")), body);
+  check();
+}
+
+// ---- one study
+
+const SHOWN_BY_DEFAULT = 4;
+
+function study(id) {
+  const title = h("h1", {}), state = h("span", { class: "state" }), reason = h("p", { class: "error" });
+  const bar = h("progress", { "aria-label": "progress" }), counts = h("p", { class: "faint" });
+  const buttons = h("div", { class: "buttons" }), plot = h("figure"), table = h("div", { class: "wide" });
+  const models = h("div"), log = h("pre", { tabindex: "0", "aria-label": "end of the log" });
+  const shown = new Set();
+  let known = "", drawn = "", chosen = false;
+
+  const act = (label, action, style) => h("button", { class: style || null, onclick: async () => {
+    try { await action(); alarm(""); await poll(); } catch (error) { alarm(error.message); }
+  } }, label);
+  function fillButtons(found) {
+    if (known === stateOf(found)) return;
+    known = stateOf(found);
+    const path = `/api/studies/${id}`, active = found.state === "running" || found.state === "queued";
+    buttons.replaceChildren(...[
+      found.state === "done" ? download(`${path}/result.nc`, "Result (netCDF)") : null,
+      found.state === "done" ? download(`${path}/report.html`, "Report (HTML)") : null,
+      download(`${path}/study.toml`, "Study (TOML)"),
+      active && !found.cancelling ? act("Cancel", () => post(`${path}/cancel`, "")) : null,
+      found.state === "cancelled" || found.state === "failed" ? act("Resume", () => post(`${path}/resume`, ""), "main") : null,
+      found.state !== "running" ? act("Remove", async () => {
+        if (!confirm(`Remove the study ${found.name} with all its results?`)) return;
+        await ask(path, { method: "DELETE" });
+        location.hash = "#/new";
+      }) : null].filter(Boolean));
+  }
+  function drawFigure(curve) {
+    if (!chosen && curve.models.length) {
+      chosen = true;
+      curve.models.filter(m => m.curves.some(c => c.some(v => v > 0))).slice(0, SHOWN_BY_DEFAULT).forEach(m => shown.add(m.name));
+    }
+    if (!curve.series.length) {
+      plot.replaceChildren(h("p", { class: "faint" }, "The figure appears with the first realizations."));
+      return;
+    }
+    const { svg, legend } = figure(curve, shown, $("main").clientWidth);
+    const level = Math.round(100 * curve.confidence);
+    plot.replaceChildren(svg, h("ul", { class: "legend" }, legend.map(([name, sample]) => h("li", {}, sample, name))),
+      h("figcaption", {}, `Mean over ${curve.units} packings${curve.complete ? "" : " so far"}, with the ${level} % Student-t interval of the mean: ` +
+        "bands and bars. Packings without a path count as 0. Dashed: models."));
+    fillTable(curve);
+    fillModels(curve);
+  }
+  function fillTable(curve) {
+    const head = curve.series.map(series => h("th", { scope: "col" }, seriesName(series)));
+    const cell = (series, i) => series.mean[i] === null ? "–" : series.mean[i].toPrecision(4) +
+      (series.low[i] === null ? "" : ` ± ${(0.5 * (series.high[i] - series.low[i])).toPrecision(2)}`) + ` (${series.count[i]})`;
+    table.replaceChildren(h("table", {}, h("caption", { class: "faint" }, "W/(m K), in brackets the realizations"),
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "density"), head)),
+      h("tbody", {}, curve.density.map((x, i) => h("tr", {}, h("th", { scope: "row" }, x === null ? "own" : String(+x.toPrecision(6))),
+        curve.series.map(series => h("td", {}, cell(series, i))))))));
+  }
+  function fillModels(curve) {
+    const focused = document.activeElement && models.contains(document.activeElement) ? document.activeElement.id : null;
+    const rows = curve.models.map(model => h("tr", {},
+      h("td", {}, h("input", { type: "checkbox", id: `show-${model.name}`, checked: shown.has(model.name), "aria-label": `draw ${model.title}`,
+        onchange: event => { event.target.checked ? shown.add(model.name) : shown.delete(model.name); drawFigure(curve); } })),
+      h("td", { class: "text" }, h("label", { for: `show-${model.name}` }, model.title)), h("td", { class: "text" }, model.kind),
+      h("td", {}, model.rms_relative_difference === null ? "–" : `${(100 * model.rms_relative_difference).toPrecision(3)} %`),
+      h("td", { class: "text" }, model.note || (model.name === curve.best_model ? "closest estimate" : ""))));
+    models.replaceChildren(curve.remark ? h("p", { class: "faint" }, curve.remark) : h("div", { class: "wide" }, h("table", {},
+      h("thead", {}, h("tr", {}, h("th", {}, "draw"), h("th", { class: "text" }, "model"), h("th", { class: "text" }, "kind"),
+        h("th", {}, "rms difference"), h("th", { class: "text" }, "remark"))), h("tbody", {}, rows))));
+    if (curve.bounds_broken) models.prepend(h("p", { class: "error" }, "A rigorous bound is broken: look at the report."));
+    if (focused && $(focused)) $(focused).focus();
+  }
+  async function poll() {
+    const found = await get(`/api/studies/${id}`);
+    title.textContent = found.name;
+    state.textContent = stateOf(found);
+    state.className = `state ${found.state}`;
+    reason.textContent = found.reason === found.state ? "" : found.reason;
+    bar.max = found.planned; bar.value = found.done;
+    bar.hidden = found.state === "done";
+    const failed = found.failed_cells ? `, ${found.failed_cells} results without a conductivity` : "";
+    const more = found.most > found.planned ? ` (adaptive: ${found.most} at most)` : "";
+    counts.replaceChildren(state, ` – ${found.done} of ${found.planned} packings${more}${failed}`);
+    log.textContent = found.log || "nothing yet";
+    fillButtons(found);
+    const version = `${found.state} ${found.done}`;
+    if (version !== drawn || found.state === "running") {
+      drawFigure(await get(`/api/studies/${id}/curve`));
+      drawn = version;
+    }
+    return found.state === "running" || found.state === "queued";
+  }
+  show(title, counts, bar, reason, buttons, plot, h("h3", {}, "Models beside it"), models,
+    h("details", {}, h("summary", {}, "Values"), table), h("details", {}, h("summary", {}, "Log"), log));
+  view.poll = poll;
+  return poll();
+}
+
+// ---- single solve and models
+
+function facts(entries) {
+  return h("dl", { class: "facts" }, entries.map(([key, value]) => h("div", {}, h("dt", {}, key), h("dd", {}, value))));
+}
+
+function solve() {
+  const field = (id, label, control, hint) => h("div", { class: "field" }, h("label", { for: id }, label), control, h("p", { class: "hint" }, hint));
+  const input = (id, value, hint, label) => field(id, label, h("input", { id, name: id, value, autocomplete: "off" }), hint);
+  const answer = h("div", { "aria-live": "polite" }), button = h("button", { class: "main" }, "Solve");
+  const form = h("form", { novalidate: true }, h("fieldset", {}, h("legend", {}, "Particles"), h("div", { class: "fields" },
+    field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS dump"),
+    input("box", "1,1", "edge lengths, for CSV; a dump brings its own", "Box"), input("periodic", "", "such as xy, for CSV", "Periodic axes"),
+    field("method", "Method", h("select", { id: "method", name: "method" }, about.conduction_methods.dtem.map(m => h("option", {}, m))), ""),
+    input("contact_angle", "", "degrees; empty: overlaps", "Contact half-angle"), input("conductivity", "", "of the particles [W/(m K)]", "Conductivity"))),
+    h("div", { class: "buttons" }, button));
+  form.addEventListener("submit", async event => {
+    event.preventDefault();
+    const file = $("file").files[0];
+    if (!file) { answer.replaceChildren(h("p", { class: "error" }, "Choose a file first.")); return; }
+    const query = new URLSearchParams();
+    for (const name of ["box", "periodic", "method", "contact_angle", "conductivity"]) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
+    button.disabled = true;
+    answer.replaceChildren(h("p", { class: "faint" }, "Solving …"));
+    try {
+      const found = await post(`/api/solve?${query}`, file, "application/octet-stream");
+      const shown = [["conductivity [W/(m K)]", found.conductivity.toPrecision(8)], ["particles", found.particles], ["contacts", found.contacts],
+        ["wall contacts", found.wall_contacts], ["percolates", found.percolates ? "yes" : "no"], ["method", found.method], ["seconds", found.seconds.toFixed(2)]];
+      if (found.conductivity_tensor) shown.splice(1, 0, ["tensor", found.conductivity_tensor.map(row => row.map(k => k.toPrecision(6)).join(" ")).join("; ")]);
+      answer.replaceChildren(facts(shown.map(([key, value]) => [key, String(value)])), ...found.warnings.map(text => h("p", { class: "error" }, text)));
+    } catch (error) { answer.replaceChildren(h("p", { class: "error", role: "alert" }, error.message)); }
+    button.disabled = false;
+  });
+  show(h("h1", {}, "Single solve"), h("p", { class: "faint" }, "The effective conductivity of one packing of your own, between walls at x = 0 and x = L, or periodic."), form, answer);
+}
+
+async function models() {
+  const mine = view;
+  if (!catalogue) catalogue = (await get("/api/models")).models;
+  if (mine !== view) return; // somebody has gone on to another part meanwhile
+  const select = h("select", { id: "model" }, catalogue.map(model => h("option", { value: model.model }, model.title)));
+  const detail = h("div");
+  function fill() {
+    const model = catalogue.find(item => item.model === select.value), answer = h("p", { "aria-live": "polite" });
+    const form = h("form", { novalidate: true }, h("div", { class: "fields" }, model.inputs.map(item => h("div", { class: "field" },
+      h("label", { for: `in-${item.name}` }, item.name), h("input", { id: `in-${item.name}`, name: item.name, autocomplete: "off",
+        placeholder: item.default === null ? "" : String(item.default) }),
+      h("p", { class: "hint" }, `${item.meaning}, ${item.unit === "-" ? "" : `[${item.unit}], `}in ${item.allowed}`))),
+      h("div", { class: "field" }, h("label", { for: "in-dimension" }, "dimension"),
+        h("select", { id: "in-dimension", name: "dimension" }, model.dimensions.map(d => h("option", {}, String(d)))))),
+      h("div", { class: "buttons" }, h("button", { class: "main" }, "Evaluate"), answer));
+    form.addEventListener("submit", async event => {
+      event.preventDefault();
+      const body = { dimension: Number(form.elements.dimension.value), parameters: {} };
+      for (const { name } of model.inputs) {
+        const word = form.elements[name].value.trim();
+        if (word) (["k1", "k2", "fraction"].includes(name) ? body : body.parameters)[name] = word;
+      }
+      try {
+        const found = await post(`/api/models/${model.model}`, JSON.stringify(body), "application/json");
+        answer.className = "";
+        answer.textContent = `${found.conductivity === null ? "infinite" : found.conductivity.toPrecision(10)} W/(m K)`;
+      } catch (error) { answer.className = "error"; answer.textContent = error.message; }
+    });
+    detail.replaceChildren(facts([["kind", model.kind], ["dimension", model.dimensions.map(d => `${d}D`).join(", ")], ["name", model.model]]), form,
+      h("p", {}, h("strong", {}, "Validity: "), model.validity), h("p", {}, h("strong", {}, "Limits: "), model.limits), h("p", { class: "faint" }, model.reference));
+  }
+  select.addEventListener("change", fill);
+  show(h("h1", {}, "Conductivity models"), h("p", { class: "faint" }, "Closed-form estimates and bounds for two-phase media."),
+    h("div", { class: "field" }, h("label", { for: "model" }, "Model"), select), detail);
+  fill();
+}
+
+// ---- which part is shown, and when it is asked for again
+
+function show(...children) { $("main").replaceChildren(...children); }
+
+async function route() {
+  view = { poll: null };
+  alarm("");
+  const [, part, id] = location.hash.split("/");
+  for (const link of document.querySelectorAll("nav a")) link.toggleAttribute("aria-current", link.hash === `#/${part || "new"}`);
+  try {
+    if (part === "study" && /^[0-9a-f]{16}$/.test(id || "")) await study(id);
+    else if (part === "solve") solve();
+    else if (part === "models") await models();
+    else newStudy();
+    await refreshQueue();
+  } catch (error) { alarm(error.message); }
+}
+
+let ticking = null;
+async function tick() {
+  clearTimeout(ticking);
+  let busy = false;
+  try {
+    busy = await refreshQueue();
+    if (view.poll) busy = await view.poll() || busy;
+    alarm("");
+  } catch (error) { if (error.status !== 401) alarm(error.message); }
+  const seconds = document.hidden ? HIDDEN_SECONDS : busy ? BUSY_SECONDS : IDLE_SECONDS;
+  ticking = setTimeout(tick, 1000 * seconds);
+}
+
+async function start() {
+  try { about = await get("/api/service"); }
+  catch (error) { if (error.status !== 401) alarm(error.message); return; }
+  $("about").textContent = `${about.ranks} rank${about.ranks > 1 ? "s" : ""} a study, ${about.launcher}`;
+  await route();
+  ticking = setTimeout(tick, 1000 * BUSY_SECONDS);
+}
+
+addEventListener("hashchange", () => { $("main").focus(); if (about) route(); });
+addEventListener("visibilitychange", () => { if (!document.hidden && about) tick(); });
+start();

@@ -1,0 +1,131 @@
+"use strict";
+// The figure of conductivity over density: bands of confidence, means with marks, and models as dashed lines.
+
+const SVG = "http://www.w3.org/2000/svg";
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#b65c93", "#c58a00", "#3a93c9"]; // told apart by the colour-blind
+const DASHES = ["7 4", "2 3", "10 3 2 3", "5 2", "1 4", "12 5"];
+const HEIGHT = 470, LEFT = 70, RIGHT = 20, TOP = 16, BOTTOM = 52;
+
+function draw(tag, attributes, ...children) {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+// Steps of 1, 2 or 5 times a power of ten, about `wanted` of them.
+function ticks(low, high, wanted) {
+  const raw = (high - low) / wanted, power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map(factor => factor * power).find(size => size >= raw);
+  const first = Math.ceil(low / step - 1e-9);
+  const values = [];
+  for (let i = first; i * step <= high + 1e-9 * step; i++) values.push(i * step);
+  return { values, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
+}
+
+function range(values, margin, fallback) {
+  const finite = values.filter(value => value !== null);
+  if (!finite.length) return [0, 1];
+  const low = Math.min(...finite), high = Math.max(...finite);
+  const more = high > low ? margin * (high - low) : fallback * Math.abs(high) || 0.5;
+  return [low - more, high + more];
+}
+
+function mark(shape, x, y, colour) {
+  const size = 4.6, common = { fill: colour, stroke: "none" };
+  if (shape % 4 === 0) return draw("circle", { cx: x, cy: y, r: size, ...common });
+  if (shape % 4 === 1) return draw("rect", { x: x - size, y: y - size, width: 2 * size, height: 2 * size, ...common });
+  const d = shape % 4 === 2
+    ? `M${x} ${y - 1.3 * size}L${x + 1.2 * size} ${y + size}L${x - 1.2 * size} ${y + size}Z`
+    : `M${x} ${y - 1.4 * size}L${x + 1.4 * size} ${y}L${x} ${y + 1.4 * size}L${x - 1.4 * size} ${y}Z`;
+  return draw("path", { d, ...common });
+}
+
+function seriesName(series) {
+  const words = [];
+  if (series.contact_angle !== null) words.push(`contact half-angle ${series.contact_angle}°`);
+  if (series.method !== null) words.push(series.method);
+  return words.join(", ") || "simulation";
+}
+
+// Runs of neighbouring points for which all the given values are there.
+function runs(density, ...lists) {
+  const found = [[]];
+  density.forEach((x, i) => {
+    if (x !== null && lists.every(list => list[i] !== null)) found[found.length - 1].push(i);
+    else if (found[found.length - 1].length) found.push([]);
+  });
+  return found.filter(run => run.length);
+}
+
+// Answers the SVG and the entries of its legend; a narrow page gets a narrow figure, whose letters stay readable.
+function figure(curve, shownModels, room) {
+  const WIDTH = room < 600 ? 520 : 900;
+  const across = range(curve.density, 0.04, 0.05);
+  const all = curve.series.flatMap(s => [...s.mean, ...s.low, ...s.high]);
+  const up = range(all, 0.07, 0.2);
+  const X = x => LEFT + (x - across[0]) / (across[1] - across[0]) * (WIDTH - LEFT - RIGHT);
+  const Y = y => HEIGHT - BOTTOM - (y - up[0]) / (up[1] - up[0]) * (HEIGHT - TOP - BOTTOM);
+  const at = (x, y) => `${X(x).toFixed(2)} ${Y(y).toFixed(2)}`;
+  const level = Math.round(100 * curve.confidence);
+  const svg = draw("svg", { class: "curve", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img",
+    "aria-label": `Effective conductivity over density with ${level} % confidence bands; the values are in the table below` });
+  const clip = draw("clipPath", { id: "plot" },
+    draw("rect", { x: LEFT, y: TOP, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP - BOTTOM }));
+  svg.append(draw("defs", {}, clip));
+  const horizontal = ticks(...across, WIDTH / 130), vertical = ticks(...up, 6);
+  for (const x of horizontal.values) {
+    svg.append(draw("line", { class: "grid", x1: X(x), x2: X(x), y1: TOP, y2: HEIGHT - BOTTOM }),
+      draw("text", { x: X(x), y: HEIGHT - BOTTOM + 20, "text-anchor": "middle" }, x.toFixed(horizontal.digits)));
+  }
+  for (const y of vertical.values) {
+    svg.append(draw("line", { class: "grid", x1: LEFT, x2: WIDTH - RIGHT, y1: Y(y), y2: Y(y) }),
+      draw("text", { x: LEFT - 9, y: Y(y) + 4, "text-anchor": "end" }, y.toFixed(vertical.digits)));
+  }
+  svg.append(draw("rect", { class: "frame", x: LEFT, y: TOP, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP - BOTTOM }),
+    draw("text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, "text-anchor": "middle" }, "density"),
+    draw("text", { x: 0, y: 0, transform: `translate(18 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)`, "text-anchor": "middle" },
+      "effective conductivity [W/(m K)]"));
+  const plot = draw("g", { "clip-path": "url(#plot)" });
+  svg.append(plot);
+  const legend = [];
+  curve.models.filter(model => shownModels.has(model.name)).forEach((model, number) => {
+    const dash = DASHES[number % DASHES.length];
+    for (const values of model.curves) {
+      for (const run of runs(model.density, values)) {
+        const d = "M" + run.map(i => at(model.density[i], values[i])).join("L");
+        plot.append(draw("path", { class: "model", d, "stroke-dasharray": dash }));
+      }
+    }
+    const sample = draw("path", { class: "model", d: "M1 7H33", "stroke-dasharray": dash });
+    legend.push([model.title, draw("svg", { class: "curve", viewBox: "0 0 34 14", "aria-hidden": "true" }, sample)]);
+  });
+  curve.series.forEach((series, number) => {
+    const colour = COLOURS[number % COLOURS.length], name = seriesName(series);
+    for (const run of runs(curve.density, series.low, series.high)) {
+      const low = run.map(i => at(curve.density[i], series.low[i]));
+      const high = run.map(i => at(curve.density[i], series.high[i])).reverse();
+      const d = `M${[...low, ...high].join("L")}Z`;
+      plot.append(draw("path", { class: "band", d, fill: colour, "fill-opacity": 0.17, stroke: "none" }));
+    }
+    for (const run of runs(curve.density, series.mean)) {
+      const d = "M" + run.map(i => at(curve.density[i], series.mean[i])).join("L");
+      plot.append(draw("path", { d, fill: "none", stroke: colour, "stroke-width": 1.8 }));
+      for (const i of run) {
+        const x = X(curve.density[i]);
+        if (series.low[i] !== null) {
+          const y1 = Y(series.low[i]), y2 = Y(series.high[i]);
+          plot.append(draw("path", { class: "bar", d: `M${x - 4} ${y1}h8M${x - 4} ${y2}h8M${x} ${y1}V${y2}`, stroke: colour, fill: "none" }));
+        }
+        const point = mark(number, x, Y(series.mean[i]), colour);
+        const width = series.low[i] === null ? "" : ` ± ${(0.5 * (series.high[i] - series.low[i])).toPrecision(2)}`;
+        point.append(draw("title", {}, `${name}: ${series.mean[i].toPrecision(4)}${width}, ${series.count[i]} realizations`));
+        plot.append(point);
+      }
+    }
+    const sample = draw("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" },
+      draw("path", { d: "M1 7H33", stroke: colour, "stroke-width": 2 }), mark(number, 17, 7, colour));
+    legend.splice(number, 0, [name, sample]);
+  });
+  return { svg, legend };
+}

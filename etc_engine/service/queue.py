@@ -1,0 +1,231 @@
+"""The queue: studies and their states in an SQLite file, safe from kills at any moment (write-ahead log)."""
+
+from __future__ import annotations
+
+import sqlite3
+import threading
+import time
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from etc_engine.batch.provenance import now
+from etc_engine.errors import InputError, OutputError
+
+State = Literal["queued", "running", "done", "failed", "cancelled"]
+STATES: tuple[State, ...] = get_args(State)
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS studies (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    id TEXT NOT NULL UNIQUE,
+    name TEXT NOT NULL,
+    state TEXT NOT NULL,
+    reason TEXT NOT NULL DEFAULT '',
+    cancelling INTEGER NOT NULL DEFAULT 0,
+    done INTEGER NOT NULL DEFAULT 0,
+    planned INTEGER NOT NULL,
+    most INTEGER NOT NULL,
+    failed_cells INTEGER NOT NULL DEFAULT 0,
+    attempts INTEGER NOT NULL DEFAULT 0,
+    submitted TEXT NOT NULL,
+    started TEXT NOT NULL DEFAULT '',
+    ended TEXT NOT NULL DEFAULT '',
+    batch TEXT NOT NULL DEFAULT '',
+    place REAL NOT NULL
+);
+CREATE INDEX IF NOT EXISTS by_state ON studies (state, place);
+"""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A study in the queue.
+
+    ``done`` of ``planned`` units are finished; an adaptive study grows to ``most`` at most. ``attempts`` counts starts
+    of its batch without a finished unit since the last one; ``batch`` tells the running batch to its launcher.
+    """
+
+    number: int
+    id: str
+    name: str
+    state: State
+    reason: str
+    cancelling: bool
+    done: int
+    planned: int
+    most: int
+    failed_cells: int
+    attempts: int
+    submitted: str
+    started: str
+    ended: str
+    batch: str
+
+
+NAMES = tuple(field.name for field in fields(Entry))
+COLUMNS = ", ".join(NAMES)
+
+
+class Queue:
+    """The queue in a file.
+
+    Parameters
+    ----------
+    path : Path
+        The SQLite file, made if it is not there.
+    limit : int
+        Most studies that may wait.
+
+    Raises
+    ------
+    OutputError
+        If the file is damaged or cannot be written.
+
+    Examples
+    --------
+    >>> queue = Queue(Path(":memory:"))
+    >>> entry, new = queue.submit("a1", "first", 10, 10)
+    >>> entry.state, new, queue.submit("a1", "first", 10, 10)[1]
+    ('queued', True, False)
+    >>> queue.close()
+    """
+
+    def __init__(self, path: Path, limit: int = 10_000) -> None:
+        self._limit, self._guard = limit, threading.RLock()
+        try:
+            self._base = sqlite3.connect(path, timeout=30.0, isolation_level=None, check_same_thread=False)
+            self._base.execute("PRAGMA journal_mode=WAL")
+            self._base.execute("PRAGMA synchronous=FULL")
+            self._base.executescript(SCHEMA)
+        except sqlite3.Error as error:
+            raise OutputError(f"queue {path}: {error}") from None
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._guard:
+            self._base.close()
+
+    def submit(self, study: str, name: str, planned: int, most: int) -> tuple[Entry, bool]:
+        """Put a study in the queue, unless it is there; answers its entry and whether it is new.
+
+        Raises
+        ------
+        InputError
+            If the queue is full.
+        """
+        with self._guard:
+            known = self.get(study)
+            if known is not None:
+                return known, False
+            if self.count("queued") >= self._limit:
+                raise InputError(f"{self._limit} studies are waiting, no more are taken: come back later")
+            self._do(
+                "INSERT INTO studies (id, name, state, planned, most, submitted, place) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (study, name, "queued", planned, most, now(), time.time()),
+            )
+            return self.require(study), True
+
+    def get(self, study: str) -> Entry | None:
+        """The entry of a study, if there is one."""
+        found = self._ask("WHERE id = ?", (study,))
+        return found[0] if found else None
+
+    def require(self, study: str) -> Entry:
+        """The entry of a study that has one."""
+        entry = self.get(study)
+        if entry is None:
+            raise KeyError(study)
+        return entry
+
+    def entries(self, state: State | None = None, limit: int = 1000, offset: int = 0) -> list[Entry]:
+        """Entries, the newest first."""
+        where, values = ("WHERE state = ? ", (state,)) if state else ("", ())
+        return self._ask(f"{where}ORDER BY number DESC LIMIT ? OFFSET ?", (*values, limit, offset))
+
+    def count(self, state: State | None = None) -> int:
+        """Number of studies, or of those in a state."""
+        where, values = (" WHERE state = ?", (state,)) if state else ("", ())
+        with self._guard:
+            return int(self._base.execute(f"SELECT COUNT(*) FROM studies{where}", values).fetchone()[0])
+
+    def first_waiting(self, later: frozenset[str] = frozenset()) -> Entry | None:
+        """The study that waits longest, but for those that are to be tried later."""
+        for entry in self._ask("WHERE state = 'queued' ORDER BY place LIMIT ?", (len(later) + 1,)):
+            if entry.id not in later:
+                return entry
+        return None
+
+    def begin(self, study: str) -> None:
+        """A batch of the study is about to be started."""
+        self._do(
+            "UPDATE studies SET state = 'running', batch = '', reason = '', ended = '', attempts = attempts + 1, "
+            "started = CASE started WHEN '' THEN ? ELSE started END WHERE id = ?",
+            (now(), study),
+        )
+
+    def set_batch(self, study: str, batch: str) -> None:
+        """Note how the running batch is found again."""
+        self._do("UPDATE studies SET batch = ? WHERE id = ?", (batch, study))
+
+    def set_done(self, study: str, done: int) -> None:
+        """Note finished units; new ones show that a restart is worth its while."""
+        self._do(
+            "UPDATE studies SET attempts = CASE WHEN done < ? THEN 0 ELSE attempts END, done = ? WHERE id = ?",
+            (done, done, study),
+        )
+
+    def finish(self, study: str, units: int, failed_cells: int) -> None:
+        """The result is complete."""
+        self._do(
+            "UPDATE studies SET state = 'done', reason = '', cancelling = 0, batch = '', done = ?, planned = ?, "
+            "failed_cells = ?, ended = ? WHERE id = ?",
+            (units, units, failed_cells, now(), study),
+        )
+
+    def settle(self, study: str, state: Literal["failed", "cancelled"], reason: str) -> None:
+        """The study ends without a result; what is finished is kept."""
+        self._do(
+            "UPDATE studies SET state = ?, reason = ?, cancelling = 0, batch = '', ended = ? WHERE id = ?",
+            (state, reason, now(), study),
+        )
+
+    def put_back(self, study: str, reason: str) -> None:
+        """The batch ended before its time: the study goes on in its old place."""
+        self._do("UPDATE studies SET state = 'queued', reason = ?, batch = '' WHERE id = ?", (reason, study))
+
+    def cancel(self, study: str) -> bool:
+        """Ask for the end of a study; answers False if it is neither waiting nor running."""
+        with self._guard:
+            waiting = self._do(
+                "UPDATE studies SET state = 'cancelled', reason = 'cancelled', ended = ? "
+                "WHERE id = ? AND state = 'queued'",
+                (now(), study),
+            )
+            return bool(
+                waiting or self._do("UPDATE studies SET cancelling = 1 WHERE id = ? AND state = 'running'", (study,))
+            )
+
+    def resume(self, study: str) -> bool:
+        """Put a cancelled or failed study at the end of the queue; answers False if it is neither."""
+        return bool(
+            self._do(
+                "UPDATE studies SET state = 'queued', reason = '', ended = '', attempts = 0, place = ? "
+                "WHERE id = ? AND state IN ('cancelled', 'failed')",
+                (time.time(), study),
+            )
+        )
+
+    def remove(self, study: str) -> bool:
+        """Forget a study that is not running; answers False if it is."""
+        return bool(self._do("DELETE FROM studies WHERE id = ? AND state != 'running'", (study,)))
+
+    def _ask(self, rest: str, values: tuple[Any, ...]) -> list[Entry]:
+        with self._guard:
+            rows = self._base.execute(f"SELECT {COLUMNS} FROM studies {rest}", values).fetchall()
+        named = [dict(zip(NAMES, row, strict=True)) for row in rows]
+        return [Entry(**{**values, "cancelling": bool(values["cancelling"])}) for values in named]
+
+    def _do(self, statement: str, values: tuple[Any, ...]) -> int:
+        """Change something; answers how many studies it concerned."""
+        with self._guard:
+            return self._base.execute(statement, values).rowcount

@@ -1,0 +1,97 @@
+"""Bodies and refusals of the HTTP interface: what is taken, and every error as one line of JSON."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import sqlite3
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from starlette.exceptions import HTTPException
+
+from etc_engine.errors import EtcError, StudyError
+from etc_engine.service.admission import field_of
+from etc_engine.service.messages import Problem
+from etc_engine.service.running import BusyError, EngineError
+
+log = logging.getLogger("etc_engine.service")
+
+STUDY_BODY = {
+    "requestBody": {
+        "required": True,
+        "description": "a study, as TOML or as JSON of the same structure",
+        "content": {
+            "application/toml": {"schema": {"type": "string"}},
+            "application/json": {"schema": {"type": "object"}},
+        },
+    }
+}
+PARTICLES_BODY = {
+    "requestBody": {
+        "required": True,
+        "description": "a CSV file with the columns x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS text dump",
+        "content": {
+            "text/csv": {"schema": {"type": "string"}},
+            "application/octet-stream": {"schema": {"type": "string"}},
+        },
+    }
+}
+REFUSALS: dict[int | str, dict[str, Any]] = {
+    400: {"model": Problem, "description": "the body cannot be read"},
+    401: {"model": Problem, "description": "a token is needed"},
+    403: {"model": Problem, "description": "from a page of another site"},
+    404: {"model": Problem, "description": "there is no such study, model or file"},
+    409: {"model": Problem, "description": "not in this state"},
+    413: {"model": Problem, "description": "too long"},
+    422: {"model": Problem, "description": "refused, in the words of the command line"},
+    429: {"model": Problem, "description": "too many requests of this kind are waiting"},
+}
+
+
+def add_refusals(app: FastAPI) -> None:
+    """Answer every exception of an application in JSON."""
+    app.add_exception_handler(RequestValidationError, _refuse_parameter)
+    app.add_exception_handler(HTTPException, _refuse_request)
+    app.add_exception_handler(EtcError, _refuse_input)
+    app.add_exception_handler(OSError, _report_failure)
+    app.add_exception_handler(sqlite3.Error, _report_failure)
+    app.add_exception_handler(Exception, _report_failure)
+
+
+def _problem(status: int, error: str, field: str = "") -> JSONResponse:
+    return JSONResponse({"error": " ".join(error.split()), "field": field}, status)
+
+
+def _refuse_input(_request: Request, error: Exception) -> Response:
+    if isinstance(error, EngineError):
+        log.error("%s", error)
+        return _problem(500, str(error))
+    if isinstance(error, BusyError):
+        return _problem(429, str(error))
+    return _problem(422, str(error), field_of(str(error)) if isinstance(error, StudyError) else "")
+
+
+def _refuse_request(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    reason = str(error.detail)
+    if reason == "Not Found":
+        reason = f"there is nothing at {request.url.path[:200]}"
+    return _problem(error.status_code, reason)
+
+
+def _refuse_parameter(_request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    field = ".".join(str(step) for step in first["loc"][1:])
+    return _problem(422, f"{field or 'body'}: {first['msg']}", field)
+
+
+def _report_failure(_request: Request, error: Exception) -> Response:
+    full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+    if full or (isinstance(error, sqlite3.Error) and "full" in str(error)):
+        return _problem(507, "the disk of the service is full: nothing was changed, try again when there is room")
+    log.error("unexpected %s: %s", type(error).__name__, error, exc_info=error)
+    return _problem(500, f"unexpected {type(error).__name__} in the service, see its log")

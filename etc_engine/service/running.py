@@ -1,0 +1,128 @@
+"""Commands of the engine for a request: in a process of their own, held in time and memory, and refused in one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from etc_engine.errors import InputError, OutputError
+from etc_engine.packing.formats import CSV, DUMP, format_to_read
+from etc_engine.service.launchers import HELD, batch_environment
+from etc_engine.service.settings import Settings
+from etc_engine.service.store import Store
+from etc_engine.service.supervisor import last_line
+
+UPLOAD = "upload"
+"""The name every uploaded file gets; what its owner called it is nobody's business."""
+REFUSED = 2
+REPORT_SECONDS = 600.0
+
+
+class BusyError(InputError):
+    """More requests of a kind wait than the service takes."""
+
+
+class EngineError(OutputError):
+    """A command of the engine ended in a way it should not."""
+
+
+@dataclass
+class Runner:
+    """Runs commands of the engine, a few at a time."""
+
+    store: Store
+    settings: Settings
+    _slots: threading.Semaphore = field(init=False)
+    _waiting: threading.BoundedSemaphore = field(init=False)
+    _reports: threading.Lock = field(default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        solves = self.settings.limits.solves
+        self._slots = threading.Semaphore(solves)
+        self._waiting = threading.BoundedSemaphore(5 * solves)
+
+    def solve(self, particles: bytes, options: Sequence[str]) -> dict[str, Any]:
+        """What ``etc-engine solve --json`` says of uploaded particles, with its warnings.
+
+        Raises
+        ------
+        InputError
+            If the particles are refused, take too long or too much memory, or too many requests wait.
+        """
+        if not self._waiting.acquire(blocking=False):
+            raise BusyError("too many single solves are waiting: try again in a minute")
+        try:
+            with self._slots, tempfile.TemporaryDirectory(dir=self.store.scratch) as folder:
+                (Path(folder) / UPLOAD).write_bytes(particles)
+                if format_to_read(Path(folder) / UPLOAD) not in (CSV, DUMP):
+                    raise InputError("upload: expected a CSV file or a LAMMPS/LIGGGHTS text dump, found another format")
+                line = ["solve", UPLOAD, "--json", *options]
+                printed, said = self._run(line, Path(folder), self.settings.limits.solve_seconds)
+        finally:
+            self._waiting.release()
+        warnings = [text.removeprefix("etc-engine: ") for text in said.splitlines() if text.strip()]
+        return {**json.loads(printed), "warnings": warnings}
+
+    def report(self, study: str) -> Path:
+        """The report of a finished study, made when it is first asked for.
+
+        Raises
+        ------
+        InputError
+            If it cannot be made, for instance because matplotlib is not installed.
+        """
+        page = self.store.report(study)
+        with self._reports:
+            if not page.exists():
+                line = ["report", str(self.store.result(study)), "-o", str(page)]
+                self._run(
+                    line, self.store.folder(study), REPORT_SECONDS, good=(0, 3)
+                )  # 3: a bound is broken, and shown
+        return page
+
+    def _run(self, line: Sequence[str], folder: Path, seconds: float, good: Sequence[int] = (0,)) -> tuple[str, str]:
+        """Output and errors of a command.
+
+        Raises
+        ------
+        InputError
+            With the command's own line if it refuses.
+        EngineError
+            If it fails in another way.
+        """
+        memory = self.settings.limits.memory_bytes
+        with subprocess.Popen(
+            ["/bin/sh", "-c", HELD, "sh", str(memory // 1024), *self.settings.engine, *line],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+            cwd=folder,
+            env=batch_environment(),
+            encoding="utf-8",
+            errors="replace",
+        ) as running:
+            try:
+                printed, said = running.communicate(timeout=seconds)
+            except subprocess.TimeoutExpired:
+                with suppress(ProcessLookupError):
+                    os.killpg(running.pid, signal.SIGKILL)
+                running.communicate()
+                raise InputError(f"it took longer than {seconds:g} s, which is all this service allows") from None
+        if running.returncode in good:
+            return printed, said
+        reason = last_line(said)
+        if running.returncode == REFUSED:
+            raise InputError(reason)
+        if "MemoryError" in said or "allocat" in said:
+            raise InputError(f"it takes more than {memory / 1e6:.0f} MB of memory, which is all this service allows")
+        raise EngineError(reason or f"{line[0]} ended with status {running.returncode}")

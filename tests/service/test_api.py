@@ -1,0 +1,276 @@
+"""What the service answers, asked over HTTP as its users do."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from serving import STUDY, Service, ask, renamed, until
+
+from etc_engine.batch.dataset import differing_variables, open_dataset
+from etc_engine.comparison import simulated
+from etc_engine.errors import InputError, OutputError
+from etc_engine.service import client
+
+PARTICLES = b"x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n"
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory):
+    """A service with the real engine."""
+    with Service(tmp_path_factory.mktemp("real") / "data", {"ranks": 2}) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def finished(real):
+    study = client.submit(real.server, STUDY)
+    assert study["new"]
+    return client.wait(real.server, study["id"], interval=0.05)
+
+
+def test_a_study_ends_in_the_bits_of_the_command(real, finished, tmp_path, etc_engine):
+    assert (finished["state"], finished["done"], finished["planned"]) == ("done", 6, 6), finished
+    (tmp_path / "study.toml").write_text(STUDY)
+    assert etc_engine("sweep", tmp_path / "study.toml", "-o", tmp_path / "out.nc").returncode == 0
+    fetched = client.fetch(real.server, finished["id"], tmp_path / "fetched.nc")
+    assert differing_variables(open_dataset(tmp_path / "out.nc"), fetched) == []
+    assert "6 units (6 computed now" in finished["log"]
+    assert "result.nc.shards" not in {path.name for path in real.data.glob("studies/*/*")}
+
+
+def test_the_same_study_is_answered_from_the_result(real, finished):
+    """Neither layout, order, comments nor JSON make it another study."""
+    other = '# mine\nname = "served"\nschema = 1\nseed = 271828\n' + STUDY[STUDY.index("[packing]") :]
+    for same in (STUDY, other, tomllib.loads(STUDY)):
+        again = client.submit(real.server, same)
+        assert (again["id"], again["new"], again["state"]) == (finished["id"], False, "done")
+    assert client.submit(real.server, renamed("else"))["id"] != finished["id"]
+
+
+def test_the_figure_has_the_numbers_of_the_result(real, finished):
+    _, _, body = ask(f"{real.url}/api/studies/{finished['id']}/curve")
+    curve = json.loads(body)
+    assert curve["complete"]
+    statistics = simulated(client.fetch(real.server, finished["id"]))
+    assert curve["density"] == [0.55, 0.60]
+    assert [one["contact_angle"] for one in curve["series"]] == [5.0, 10.0]
+    for one in curve["series"]:
+        cell = statistics.sel(contact_angle=one["contact_angle"])
+        for key, name in (
+            ("mean", "conductivity_mean"),
+            ("low", "conductivity_ci_low"),
+            ("high", "conductivity_ci_high"),
+        ):
+            np.testing.assert_array_equal(one[key], cell[name].values)
+        assert one["count"] == [3, 3]
+    assert {"maxwell", "hashin_shtrikman_upper"} <= {model["name"] for model in curve["models"]}
+
+
+def test_the_report_is_a_page_that_may_run_nothing(real, finished):
+    pytest.importorskip("matplotlib")
+    status, headers, body = ask(f"{real.url}/api/studies/{finished['id']}/report.html")
+    assert status == 200
+    assert body.startswith(b"<!DOCTYPE html>")
+    assert "sandbox" in headers["content-security-policy"]
+
+
+@pytest.mark.parametrize(
+    ("options", "arguments"),
+    [
+        ({"box": "1,1"}, ["--box", "1,1"]),
+        ({"box": "1,1", "contact_angle": 5}, ["--box", "1,1", "--contact-angle", "5"]),
+    ],
+)
+def test_a_single_solve_is_that_of_the_command(service, tmp_path, etc_engine, options, arguments):
+    (tmp_path / "disks.csv").write_bytes(PARTICLES)
+    printed = json.loads(etc_engine("solve", tmp_path / "disks.csv", *arguments, "--json").stdout)
+    found = client.solve(service.server, PARTICLES, **options)
+    assert {key: found[key] for key in printed if key != "seconds"} == {
+        k: v for k, v in printed.items() if k != "seconds"
+    }
+
+
+def test_a_dump_brings_its_box(service):
+    dump = (service.data.parents[0] / "x.dump").with_name("x")
+    text = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ff ff pp\n0 1\n0 1\n-0.5 0.5\n"
+    dump.write_text(text + "ITEM: ATOMS id x y z radius\n1 0.25 0.5 0 0.26\n2 0.75 0.5 0 0.26\n")
+    found = client.solve(service.server, dump.read_bytes())
+    assert found["conductivity"] == client.solve(service.server, PARTICLES, box="1,1")["conductivity"]
+
+
+@pytest.mark.parametrize(
+    ("particles", "options", "words"),
+    [
+        (PARTICLES, {}, "--box is missing"),
+        (PARTICLES, {"box": "1,1", "method": "magic"}, "magic"),
+        (b"x,y\n1,2\n", {"box": "1,1"}, "upload has the header 'x,y'"),
+        (b"x,y,radius\n0.5,0.5,much\n", {"box": "1,1"}, "upload, line 2: radius is not a number: 'much'"),
+        (b"\x89HDF\r\n\x1a\n", {}, "another format"),
+        (b"", {"box": "1,1"}, "header"),
+        (PARTICLES, {"box": "1,1", "contact_angle": "nan"}, "finite"),
+        (PARTICLES, {"box": "; rm -rf"}, "box"),
+        (PARTICLES, {"box": "1,1", "modes": "--help"}, "modes"),
+    ],
+)
+def test_refused_particles(service, particles, options, words):
+    with pytest.raises(InputError) as caught:
+        client.solve(service.server, particles, **options)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert str(service.data) not in str(caught.value)
+
+
+def test_models_are_those_of_the_command(service, etc_engine):
+    assert client.models(service.server) == json.loads(etc_engine("models", "--json").stdout)["models"]
+    case = {"k1": 1.0, "k2": 10.0, "fraction": 0.3, "dimension": 2}
+    words = [word for key, value in case.items() for word in (f"--{key}", str(value))]
+    printed = json.loads(etc_engine("models", "maxwell", *words, "--json").stdout)
+    assert client.evaluate(service.server, "maxwell", **case) == printed
+    superconducting = client.evaluate(service.server, "simple_cubic", k1=1.0, k2=float("inf"), fraction=0.3)
+    assert superconducting["conductivity"] == pytest.approx(2.3328845, abs=5.1e-8)  # the value of the command's test
+
+
+@pytest.mark.parametrize(
+    ("model", "inputs", "words"),
+    [
+        ("maxwel", {}, "did you mean maxwell"),
+        ("maxwell", {"k1": 1.0, "k2": 2.0, "dimension": 2}, "also needs fraction"),
+        ("maxwell", {"k1": 1.0, "k2": 2.0, "fraction": 2.0, "dimension": 2}, "[0, 1]"),
+        ("maxwell", {"k1": 1.0, "k2": 2.0, "fraction": 0.2, "dimension": 2, "zeta2": 1.0}, "no parameter 'zeta2'"),
+    ],
+)
+def test_refused_models(service, model, inputs, words):
+    with pytest.raises(InputError) as caught:
+        client.evaluate(service.server, model, **inputs)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "words"),
+    [
+        (("0.55, 0.60", "0.55, -0.60"), "packing.density", "-0.6"),
+        (("realizations = 3", "realizations = 0"), "statistics.realizations", "at least 1"),
+        (("uniform:0.03:0.06", "uniform:0.06"), "packing.radii", "uniform"),
+        (('name = "served"', ""), "name", "missing"),
+        (("[contacts]", "[contact]"), "contact", "did you mean 'contacts'"),
+        (("realizations = 3", "realizations = 100000"), "statistics.realizations", "this service allows 100000"),
+        (("box = [1.0, 1.0]", "box = [1e6, 1e6]"), "packing.box", "this service allows 1000000"),
+        (("uniform:0.03:0.06", "equal:1e200"), "", "out of range"),
+        (("[packing]", "[packing"), "", "not valid TOML"),
+        (("box = [1.0, 1.0]", "box = " + "[" * 5000), "", "nested"),
+    ],
+)
+def test_a_refused_study_says_which_field(service, change, field, words):
+    text = STUDY.replace(*change)
+    for path in ("/api/studies", "/api/studies/check"):
+        status, _, body = ask(service.url + path, "POST", text.encode(), content_type="application/toml")
+        problem = json.loads(body)
+        assert status == 422
+        assert words in problem["error"]
+        assert "\n" not in problem["error"]
+        assert problem["field"] == field
+
+
+@pytest.mark.parametrize(
+    "body", [b"[1]", b"null", b"{", b'{"a": ' * 20000, b'{"name": "\\ud800"}', b'{"packing": {"box": [null]}}', b"\xff"]
+)
+def test_refused_json(service, body):
+    status, _, answer = ask(f"{service.url}/api/studies", "POST", body, content_type="application/json")
+    assert status in (413, 422)
+    assert json.loads(answer)["error"]
+
+
+def test_a_check_tells_the_size_and_runs_nothing(service):
+    before = len(client.studies(service.server))
+    status, _, body = ask(f"{service.url}/api/studies/check", "POST", renamed("sized").encode())
+    found = json.loads(body)
+    assert (status, found["units"], found["cells"], found["known"]) == (200, 6, 12, False)
+    assert 80 < found["particles"] < 100  # 0.6 of the box over the mean area, pi 0.0021
+    assert len(client.studies(service.server)) == before
+
+
+def test_unknown_studies_and_files_are_404(service):
+    for path in ("/api/studies/0123456789abcdef", "/api/studies/0123456789abcdef/result.nc", "/api/nothing"):
+        status, _, body = ask(service.url + path)
+        assert status == 404
+        assert json.loads(body)["error"]
+    for path in (
+        "/api/studies/..%2f..%2fqueue.sqlite/study.toml",
+        "/api/studies/%2e%2e/study.toml",
+        "/page/..%2fapp.py",
+    ):
+        assert ask(service.url + path)[0] in (404, 422)
+
+
+def test_cancel_resume_and_remove(tmp_path):
+    environment = {"ETC_TEST_SECONDS": "0.8"}
+    with Service(tmp_path / "data", slow=True, environment=environment) as service:
+        server = service.server
+        running, waiting = client.submit(server, STUDY)["id"], client.submit(server, renamed("second"))["id"]
+        until(lambda: client.status(server, running)["done"] >= 1)
+        assert client.status(server, waiting)["state"] == "queued"
+        with pytest.raises(InputError, match="its result is there when it is done"):
+            client.fetch(server, running)
+        status, _, body = ask(f"{service.url}/api/studies/{running}", "DELETE")
+        assert (status, "cancel it first" in json.loads(body)["error"]) == (409, True)
+        curve = until(lambda: json.loads(ask(f"{service.url}/api/studies/{running}/curve")[2]).get("series"))
+        assert curve[0]["count"] != [3, 3]  # some realizations only
+        client.cancel(server, waiting)
+        assert client.status(server, waiting)["state"] == "cancelled"
+        client.cancel(server, running)
+        stopped = client.wait(server, running, interval=0.05)
+        assert (stopped["state"], stopped["reason"]) == ("cancelled", "cancelled")
+        assert 1 <= stopped["done"] < 6
+        assert "stopped early (SIGTERM)" in stopped["log"]
+        with pytest.raises(InputError, match="only one that waits or runs"):
+            client.cancel(server, running)
+        client.resume(server, running)
+        assert client.submit(server, renamed("second"))["state"] == "queued"  # handing it in again goes on too
+        done = client.wait(server, running, interval=0.05)
+        assert (done["state"], done["done"]) == ("done", 6)
+        assert "units are finished already" in done["log"]
+        assert client.wait(server, waiting, interval=0.05)["state"] == "done"
+        assert ask(f"{service.url}/api/studies/{waiting}", "DELETE")[0] == 204
+        assert not (service.data / "studies" / waiting).exists()
+        assert [study["id"] for study in client.studies(server)] == [running]
+
+
+def test_a_time_limit_ends_a_study_and_says_so(tmp_path):
+    options = {"limits": {"study_seconds": 2.5}}
+    with Service(tmp_path / "data", options, {"ETC_TEST_SECONDS": "2"}, slow=True) as service:
+        study = client.submit(service.server, STUDY)["id"]
+        ended = client.wait(service.server, study, interval=0.1)
+        assert ended["state"] == "failed"
+        assert "time limit of this service, 2.5 s" in ended["reason"]
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [({"solve_seconds": 0.05, "memory_bytes": 2**40}, "longer than 0.05 s"), ({"memory_bytes": 20 * 2**20}, "memory")],
+)
+def test_time_and_memory_limits_of_a_single_solve(tmp_path, limits, words):
+    with Service(tmp_path / "data", {"limits": limits}) as service:
+        with pytest.raises(InputError) as caught:
+            client.solve(service.server, PARTICLES, box="1,1")
+        assert words in str(caught.value)
+
+
+def test_a_refused_batch_fails_with_its_own_words(tmp_path):
+    with Service(tmp_path / "data", slow=True) as service:
+        folder = service.data / "studies"
+        study = json.loads(ask(f"{service.url}/api/studies/check", "POST", STUDY.encode())[2])["id"]
+        (folder / study / "result.nc").mkdir(parents=True)  # nobody can write a file there
+        client.submit(service.server, STUDY)
+        ended = client.wait(service.server, study, interval=0.05)
+        assert ended["state"] == "failed"
+        assert "is a folder" in ended["reason"]
+
+
+def test_the_client_names_what_is_not_there():
+    with pytest.raises(OutputError, match=r"does not answer .*is the service running there"):
+        client.status(client.Server("http://127.0.0.1:9"), "0")
+    with pytest.raises(InputError, match="expected an address"):
+        client.Server("ftp://x")

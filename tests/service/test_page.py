@@ -1,0 +1,183 @@
+"""The web page in a real browser: a study built, run and looked at from end to end."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from browser import ELEMENT, MISSING, Browser
+from serving import STUDY, Service, ask, renamed, until
+
+from etc_engine.service import client
+
+pytestmark = [pytest.mark.skipif(bool(MISSING), reason=MISSING), pytest.mark.slow]
+
+FITS = "return document.documentElement.scrollWidth <= innerWidth"
+BANDS = "return [...document.querySelectorAll('path.band')].map(p => p.getBoundingClientRect().width)"
+CONTROLS = "input, select, textarea, button, a, svg[role], progress"
+UNNAMED = """return [...document.querySelectorAll(arguments[0])].filter(e => e.offsetParent !== null &&
+    !(e.labels && e.labels.length) && !e.getAttribute('aria-label') && !e.innerText).map(e => e.outerHTML)"""
+CONTRAST = """
+const light = c => { const [r, g, b] = c.match(/[0-9.]+/g).slice(0, 3).map(v => (v /= 255) <= .03928 ? v / 12.92
+    : ((v + .055) / 1.055) ** 2.4); return .2126 * r + .7152 * g + .0722 * b };
+const behind = e => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor;
+    if (!/, 0\\)$|transparent/.test(c)) return c } return 'rgb(255, 255, 255)' };
+return [...document.querySelectorAll('body *')].filter(e => e.offsetParent && [...e.childNodes].some(n =>
+    n.nodeType === 3 && n.data.trim())).map(e => {
+    const a = light(getComputedStyle(e).color), b = light(behind(e));
+    return [(Math.max(a, b) + .05) / (Math.min(a, b) + .05), e.outerHTML.slice(0, 120)] }).filter(x => x[0] < 4.5)"""
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory):
+    """A service whose packings take a third of a second."""
+    environment = {"ETC_TEST_SECONDS": "0.5"}
+    with Service(tmp_path_factory.mktemp("page") / "data", slow=True, environment=environment) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with Browser(tmp_path_factory.mktemp("browser")) as running:
+        yield running
+
+
+def written(field: str) -> str:
+    return f'[name="{field}"]'
+
+
+def problem_beside(browser: Browser, field: str) -> str:
+    return browser.until("return document.getElementById(arguments[0]).innerText", f"field-{field}-error")
+
+
+def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
+    browser.open(slow.url)
+    browser.write(written("name"), "built")
+    browser.write(written("packing.density"), "0.5, x")
+    assert "found 'x'" in problem_beside(browser, "packing.density")
+    assert browser.run("return document.querySelector('[aria-invalid]').name") == "packing.density"
+    browser.write(written("packing.density"), "0.5, 0.6, 0.7")
+    browser.write(written("packing.radii"), "uniform:0.2")
+    assert "uniform" in problem_beside(browser, "packing.radii")
+    browser.write(written("packing.radii"), "uniform:0.03:0.06")
+    browser.write(written("statistics.realizations"), "5")
+    browser.until("return document.getElementById('size').innerText.startsWith('15 packings, 30 results')")
+    assert browser.run("return document.querySelectorAll('[aria-invalid]').length") == 0
+    browser.click("#submit")
+    browser.until("return location.hash.startsWith('#/study/')")
+    first = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length ? w : null")
+    assert browser.text("main .state") == "running"
+    assert 0 < browser.run("return document.querySelector('main progress').value") < 15
+    browser.until("return document.querySelector('main .state').innerText === 'done'")
+    last = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length === 2 ? w : null")
+    assert sum(last) > sum(first)  # bands over all three densities at the end, over those with two realizations before
+    assert browser.run("return document.querySelectorAll('tbody tr').length") >= 3 + 2  # values and models
+    study = browser.run("return location.hash.split('/')[2]")
+    dataset = client.fetch(slow.server, study)
+    shown = browser.run("return document.querySelector('details table tbody td').textContent")
+    mean = float(dataset.conductivity.isel(density=0, contact_angle=0).values.diagonal(0, 1, 2).mean())
+    assert float(shown.split()[0]) == pytest.approx(mean, rel=1e-3)
+    links = browser.run("return [...document.querySelectorAll('a.button')].map(a => a.href)")
+    assert [link.rsplit("/", 1)[1] for link in links] == ["result.nc", "report.html", "study.toml"]
+    assert all(ask(link)[0] == 200 for link in links if "report" not in link)
+    assert browser.complaints() == []
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (420, "dark")])
+def test_nothing_hangs_over_and_everything_has_a_name(slow, browser, width, scheme):
+    """Also read by whoever does not see it: names of controls, and contrast of 4.5 (WCAG AA)."""
+    study = client.submit(slow.server, STUDY)["id"]
+    client.wait(slow.server, study, interval=0.1)
+    browser.resize(width, 900)
+    browser.prefer(scheme)
+    browser.open(slow.url)
+    for part, sign in (("new", "#submit"), (f"study/{study}", "path.band"), ("solve", "#file"), ("models", "#model")):
+        browser.run("location.hash = '#/' + arguments[0]", part)
+        browser.find(sign)
+        browser.run("document.querySelectorAll('details').forEach(d => d.open = true)")
+        assert browser.run(FITS), part
+        assert browser.run(UNNAMED, CONTROLS) == [], part
+        assert browser.run(CONTRAST) == [], part
+    browser.resize(1280, 900)
+    browser.prefer("light")
+
+
+def test_a_pasted_study_is_refused_then_taken_and_cancelled(slow, browser):
+    browser.open(slow.url)
+    browser.click("#tab-text")
+    assert 'radii = "uniform:0.01:0.02"' in browser.run("return document.getElementById('study-text').value")
+    paste = "const t = arguments[1]; t.value = arguments[0]; t.dispatchEvent(new Event('input'))"
+    area = {ELEMENT: browser.find("#study-text")}
+    text = renamed("pasted <b>bold</b>").replace("realizations = 3", "realizations = 40")
+    browser.run(paste, text.replace("[packing]", "[packin]"), area)
+    assert "did you mean 'packing'" in browser.until("return document.getElementById('study-error').innerText")
+    browser.run(paste, text, area)
+    browser.until("return document.getElementById('size').innerText.startsWith('80 packings')")
+    browser.click("#submit")
+    browser.until("return document.querySelector('main .state')?.innerText === 'running'")
+    assert browser.text("h1") == "pasted <b>bold</b>"
+    browser.run("[...document.querySelectorAll('main button')].find(b => b.innerText === 'Cancel').click()")
+    browser.until("return document.querySelector('main .state').innerText === 'cancelled'")
+    assert browser.run("return [...document.querySelectorAll('main button')].map(b => b.innerText)") == [
+        "Resume",
+        "Remove",
+    ]
+    assert browser.complaints() == []
+
+
+def test_a_single_solve_and_a_model(slow, browser, tmp_path):
+    (tmp_path / "disks.csv").write_text("x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n")
+    browser.open(slow.url + "/#/solve")
+    browser.choose_file("#file", tmp_path / "disks.csv")
+    browser.click("main button.main")
+    shown = browser.until("return document.querySelector('dd')?.innerText")
+    expected = client.solve(slow.server, (tmp_path / "disks.csv").read_bytes(), box="1,1")["conductivity"]
+    assert float(shown) == pytest.approx(expected, rel=1e-7)
+    browser.run("location.hash = '#/models'")
+    browser.find("#model")
+    browser.run("const m = document.getElementById('model'); m.value = 'maxwell'; m.dispatchEvent(new Event('change'))")
+    for name, value in (("k1", "1"), ("k2", "10"), ("fraction", "2")):
+        browser.write(f"#in-{name}", value)
+    browser.click("main button.main")
+    assert "must lie in [0, 1]" in browser.until("return document.querySelector('main p.error')?.innerText")
+    browser.write("#in-fraction", "0.3")
+    browser.click("main button.main")
+    browser.until("return document.querySelector('form .buttons p').innerText === '1.650602410 W/(m K)'")
+    assert browser.complaints() == []
+
+
+def test_the_page_asks_for_the_token_and_keeps_it_out_of_every_address(tmp_path, browser):
+    token = "a-word-nobody-guesses"
+    with Service(tmp_path / "data", {"token": token}, slow=True) as service:
+        study = client.submit(service.server, STUDY)["id"]
+        client.wait(service.server, study, interval=0.1)
+        browser.open(service.url)
+        browser.until("return !document.getElementById('token').hidden")
+        browser.write("#token-word", "a-wrong-word-of-some-length")
+        browser.click("#token button")
+        browser.until("return !document.getElementById('token').hidden")
+        browser.write("#token-word", token)
+        browser.click("#token button")
+        browser.find("#queue a")
+        browser.run("location.hash = '#/study/' + arguments[0]", study)
+        browser.find("path.band")
+        addresses = browser.run("return [location.href, ...performance.getEntries().map(e => e.name)]")
+        assert any("/curve" in address for address in addresses)
+        assert token not in json.dumps(addresses)
+        assert token not in browser.run("return document.documentElement.outerHTML")
+        browser.run("[...document.querySelectorAll('main button')].find(b => b.innerText.startsWith('Study')).click()")
+        assert browser.text("#alarm") == ""
+        assert token not in service.said()
+
+
+def test_the_page_goes_on_when_the_service_comes_back(tmp_path, browser):
+    service = Service(tmp_path / "data", slow=True)
+    with service:
+        port = int(service.url.rsplit(":", 1)[1])
+        browser.open(service.url)
+        browser.find("#submit")
+    browser.until("return document.getElementById('alarm').innerText.includes('does not answer')")
+    with Service(tmp_path / "data", {"port": port}, slow=True) as again:
+        client.submit(again.server, STUDY)
+        browser.until("return document.querySelector('#queue a') && document.getElementById('alarm').hidden")
+        until(lambda: browser.text("#queue .state") == "done")
