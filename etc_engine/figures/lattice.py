@@ -46,7 +46,7 @@ def draw_calibration(points: Mapping[str, NDArray[np.float64]], mean_field: NDAr
             rows[:, 0], rows[:, 1], rows[:, 2], color=colour, marker=marker, markersize=4, linewidth=1.1, capsize=2,
             label=label,
         )  # fmt: skip
-    axes.plot(mean_field[:, 0], mean_field[:, 1], "--", color=GREY, linewidth=1.0, label="mean field (lower bound)")
+    axes.plot(mean_field[:, 0], mean_field[:, 1], "--", color=GREY, linewidth=1.0, label="mean field, periodic (lower bound)")
     axes.set_xscale("log")
     _finish(axes, "particles N", "transmission coefficient $C_t$ [-]")
     return figure
