@@ -98,7 +98,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         raise
     if done.stopped:
         click.echo(
-            f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {len(study.time.times)} states are "
+            f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {done.times.size} states are "
             f"kept, go on with --resume",
             err=True,
         )
@@ -110,7 +110,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         with replacing(wanted.plot) as file:
             save_transient(series, file)
     if wanted.vtk is not None:
-        write_vtk_series(wanted.vtk, done.network.packing, series)
+        write_vtk_series(wanted.vtk, series)
     write_dataset(series, wanted.output)
     remove_states(wanted.output)
     last = done.states[-1]

@@ -74,9 +74,12 @@ def _refuse_input(_request: Request, error: Exception) -> Response:
     return _problem(422, str(error), field_of(str(error)) if isinstance(error, StudyError) else "")
 
 
-def _refuse_request(_request: Request, error: Exception) -> Response:
+def _refuse_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    return _problem(error.status_code, str(error.detail))
+    reason = str(error.detail)
+    if reason == "Not Found":
+        reason = f"there is nothing at {request.url.path[:200]}"
+    return _problem(error.status_code, reason)
 
 
 def _refuse_parameter(_request: Request, error: Exception) -> Response:

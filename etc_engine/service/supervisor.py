@@ -27,7 +27,7 @@ GRACE = 30.0
 """Seconds that a batch may take to end when it is asked to."""
 REFUSED = 2
 COUNT_SECONDS = 1.0
-RETRY_SECONDS = 2.0
+RETRY_SECONDS = 1.0
 
 
 @dataclass

@@ -1,1 +1,1 @@
-"""Transients on contact networks: the study file, the system it describes, the run and its restart."""
+"""Transients on contact networks: study files, systems, runs and restarts, moving particles."""

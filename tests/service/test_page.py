@@ -60,14 +60,14 @@ def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
     browser.write(written("packing.radii"), "uniform:0.2")
     assert "uniform" in problem_beside(browser, "packing.radii")
     browser.write(written("packing.radii"), "uniform:0.03:0.06")
-    browser.write(written("statistics.realizations"), "8")
-    browser.until("return document.getElementById('size').innerText.startsWith('24 packings, 48 results')")
+    browser.write(written("statistics.realizations"), "5")
+    browser.until("return document.getElementById('size').innerText.startsWith('15 packings, 30 results')")
     assert browser.run("return document.querySelectorAll('[aria-invalid]').length") == 0
     browser.click("#submit")
     browser.until("return location.hash.startsWith('#/study/')")
     first = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length ? w : null")
     assert browser.text("main .state") == "running"
-    assert 0 < browser.run("return document.querySelector('main progress').value") < 24
+    assert 0 < browser.run("return document.querySelector('main progress').value") < 15
     browser.until("return document.querySelector('main .state').innerText === 'done'")
     last = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length === 2 ? w : null")
     assert sum(last) > sum(first)  # bands over all three densities at the end, over those with two realizations before

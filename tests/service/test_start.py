@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import signal
 import socket
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -21,43 +19,44 @@ from etc_engine.service.queue import Queue
 from etc_engine.service.store import open_store
 
 
-def serve(*arguments: object, timeout: float = 60.0, **environment: str) -> subprocess.CompletedProcess[str]:
-    """The command as a user starts it."""
-    line = [sys.executable, "-m", "etc_engine", "serve", *map(str, arguments)]
-    clean = {key: value for key, value in os.environ.items() if key != "ETC_ENGINE_TOKEN"}
-    return subprocess.run(
-        line, capture_output=True, text=True, check=False, timeout=timeout, env={**clean, **environment}
-    )
+@pytest.fixture
+def refused(etc_engine, monkeypatch):
+    """What a command line that should be refused says, in one line."""
+
+    def serve(words: str, *arguments: object, **environment: str) -> None:
+        monkeypatch.delenv("ETC_ENGINE_TOKEN", raising=False)
+        for name, value in environment.items():
+            monkeypatch.setenv(name, value)
+        done = etc_engine("serve", *arguments)
+        assert (done.returncode, done.stdout) == (2, ""), done.stderr
+        assert len(done.stderr.splitlines()) == 1, done.stderr
+        assert words in done.stderr
+
+    return serve
 
 
-def refused(done: subprocess.CompletedProcess[str], words: str) -> None:
-    assert (done.returncode, done.stdout) == (2, ""), done.stderr
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert words in done.stderr
-
-
-def test_other_hosts_need_a_token(tmp_path):
-    refused(serve("--data", tmp_path / "d", "--host", "0.0.0.0"), "can be reached from other machines: give a token")
+def test_other_hosts_need_a_token(tmp_path, refused):
+    refused("can be reached from other machines: give a token", "--data", tmp_path / "d", "--host", "0.0.0.0")
     (tmp_path / "token").write_text("short\n")
     where = ["--data", tmp_path / "d", "--host", "0.0.0.0", "--token-file"]
-    refused(serve(*where, tmp_path / "token"), "at least 16")
-    refused(serve(*where, tmp_path / "none"), "cannot be read")
-    refused(serve(*where[:4], ETC_ENGINE_TOKEN="word one two three four"), "expected one word")
+    refused("at least 16", *where, tmp_path / "token")
+    refused("cannot be read", *where, tmp_path / "none")
+    refused("expected one word", *where[:4], ETC_ENGINE_TOKEN="word one two three four")
     assert not (tmp_path / "d").exists()
 
 
-def test_a_port_in_use(tmp_path):
+def test_a_port_in_use(tmp_path, refused):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        refused(serve("--data", tmp_path / "d", "--port", port), f"port {port} is in use")
+        refused(f"port {port} is in use", "--data", tmp_path / "d", "--port", port)
     assert not (tmp_path / "d").exists()
-    refused(serve("--data", tmp_path / "d", "--host", "192.0.2.1", ETC_ENGINE_TOKEN="x" * 20), "cannot listen")
+    refused("cannot listen", "--data", tmp_path / "d", "--host", "192.0.2.1", ETC_ENGINE_TOKEN="x" * 20)
 
 
-def test_a_second_service_is_refused_and_the_first_unharmed(tmp_path):
+def test_a_second_service_is_refused_and_the_first_unharmed(tmp_path, refused):
     with Service(tmp_path / "data", slow=True) as first:
         study = client.submit(first.server, STUDY)["id"]
-        refused(serve("--data", tmp_path / "data", "--port", 0), "another service is using it (process")
+        refused("another service is using it (process", "--data", tmp_path / "data", "--port", 0)
         assert client.wait(first.server, study, interval=0.05)["state"] == "done"
     with Service(tmp_path / "data", slow=True) as again:
         assert client.status(again.server, study)["state"] == "done"
@@ -71,22 +70,22 @@ def test_a_second_service_is_refused_and_the_first_unharmed(tmp_path):
         ("thesis.tex", "", "holds other things (thesis.tex"),
     ],
 )
-def test_a_directory_of_another_kind_stays_as_it_is(tmp_path, name, content, words):
+def test_a_directory_of_another_kind_stays_as_it_is(tmp_path, refused, name, content, words):
     (tmp_path / name).write_text(content)
-    refused(serve("--data", tmp_path, "--port", 0), words)
+    refused(words, "--data", tmp_path, "--port", 0)
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
-def test_places_that_cannot_be_written(tmp_path):
+def test_places_that_cannot_be_written(tmp_path, refused):
     (tmp_path / "file").write_text("")
-    refused(serve("--data", tmp_path / "file", "--port", 0), "is a file, expected a folder")
-    refused(serve("--data", "/proc/data", "--port", 0), "cannot be written")
+    refused("is a file, expected a folder", "--data", tmp_path / "file", "--port", 0)
+    refused("cannot be written", "--data", "/proc/data", "--port", 0)
 
 
-def test_a_damaged_queue_is_named(tmp_path):
+def test_a_damaged_queue_is_named(tmp_path, refused):
     with open_store(tmp_path / "data") as store:
         store.database.write_bytes(b"not a database, but long enough to be looked at" * 100)
-    refused(serve("--data", tmp_path / "data", "--port", 0), "queue.sqlite: file is not a database")
+    refused("queue.sqlite: file is not a database", "--data", tmp_path / "data", "--port", 0)
 
 
 @pytest.fixture
@@ -102,12 +101,12 @@ def small_disk(tmp_path):
     subprocess.run(["umount", "-l", str(place)], check=True)
 
 
-def test_a_full_disk_is_said_and_nothing_is_lost(small_disk):
+def test_a_full_disk_is_said_and_nothing_is_lost(small_disk, refused):
     """At the start; while studies are handed in; while one runs. With room again everything goes on."""
     data, filler = small_disk / "data", small_disk / "filler"
     fill = b"\0" * (small_disk_size(small_disk) - 4096)
     filler.write_bytes(fill)
-    refused(serve("--data", data, "--port", 0), "cannot be written (No space left on device)")
+    refused("cannot be written (No space left on device)", "--data", data, "--port", 0)
     filler.unlink()
     with Service(data, slow=True, environment={"ETC_TEST_SECONDS": "0.4"}) as service:
         study = client.submit(service.server, STUDY)["id"]

@@ -36,6 +36,9 @@ KEEPERS = {
     "matplotlib": {"figures"},
     "pyamg": {"solvers"},
     "click": {"cli"},
+    "fastapi": {"service"},
+    "starlette": {"service"},
+    "uvicorn": {"service/server.py"},
 }
 
 

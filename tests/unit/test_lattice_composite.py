@@ -141,7 +141,10 @@ def test_voxels_make_layers_that_conduct_as_exactly_as_they_are_drawn():
         (lambda: phase_conductivity(np.array([0, 0]), [1.0, 2.0]), "phase 1 is empty"),
         (lambda: phase_conductivity(np.array([0, 1]), [1.0, -2.0]), "positive and finite"),
         (lambda: phase_conductivity(np.array([0, 3]), [1.0, 2.0]), "phase 3 has no conductivity"),
-        (lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2), dtype=int)), r"three-dimensional array of integers, found shape \(2, 2\)"),
+        (
+            lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2), dtype=int)),
+            r"three-dimensional array of integers, found shape \(2, 2\)",
+        ),
         (lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2, 2))), "of integers"),
         (lambda: find_phases([[0.1] * 3], CUBE, lambda x: x[:, 0]), "whole phase number"),
         (lambda: spheres([[1.5, 0.5, 0.5]], 0.1, box=Box((1.0, 1.0, 1.0))), "outside the box"),
