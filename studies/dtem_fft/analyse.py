@@ -80,7 +80,7 @@ def grids(name: str, packing: ParticlePacking, largest: int, exact: float) -> li
             )
             row = rows[-1]
             print(
-                f"{name:8s}{kind:9s}{n:6d}{row['conductivity']:11.6f}{100 * row['error']:+9.2f} %{row['seconds']:7.1f} s"
+                f"{name:8s}{kind:9s}{n:6d}{row['conductivity']:11.6f}{100 * row['error']:+9.2f} %{row['seconds']:7.1f}s"
             )
     return rows
 
