@@ -11,12 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
-<<<<<<< HEAD
 from etc_engine.dtem.storage import stored_areas
-from etc_engine.pipe.conductances import PIPE_RESISTANCES
-=======
 from etc_engine.dtem.transient import transient_system
->>>>>>> dtem-time
+from etc_engine.pipe.conductances import PIPE_RESISTANCES
 from etc_engine.pipe.transient import pipe_transient
 from etc_engine.solvers.marching import HeatSystem
 from etc_engine.walls import WallCondition
@@ -77,14 +74,6 @@ def _pipe(network: ContactNetwork, physics: Physics) -> ParticleSystem:
     )
 
 
-<<<<<<< HEAD
-def storing_area(network: ContactNetwork, method: str, physics: Physics) -> NDArray[np.float64]:
-    """Area in which a method stores heat, of each particle, shape (n,) [m2]."""
-    return stored_areas(network, PIPE_RESISTANCES[physics.pipe_resistance] if method == "pipe" else method)
-
-
-SYSTEMS: Mapping[str, Callable[[ContactNetwork, Physics], ParticleSystem]] = {"pipe": _pipe}
-=======
 def _elements(network: ContactNetwork, physics: Physics, *, method: str) -> ParticleSystem:
     return transient_system(
         network,
@@ -98,6 +87,11 @@ def _elements(network: ContactNetwork, physics: Physics, *, method: str) -> Part
     )
 
 
+def storing_area(network: ContactNetwork, method: str, physics: Physics) -> NDArray[np.float64]:
+    """Area in which a method stores heat, of each particle, shape (n,) [m2]."""
+    return stored_areas(network, PIPE_RESISTANCES[physics.pipe_resistance] if method == "pipe" else method)
+
+
 SYSTEMS: Mapping[str, Callable[[ContactNetwork, Physics], ParticleSystem]] = {
     "pipe": _pipe,
     "chord": partial(_elements, method="chord"),
@@ -105,5 +99,4 @@ SYSTEMS: Mapping[str, Callable[[ContactNetwork, Physics], ParticleSystem]] = {
     "enhanced": partial(_elements, method="enhanced"),
     "arc": partial(_elements, method="arc"),
 }
->>>>>>> dtem-time
 """The system of a contact network, by the word of its method."""
