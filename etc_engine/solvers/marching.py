@@ -120,7 +120,7 @@ def march(
         Most nodes of a step matrix that is factorised instead of being given a multigrid hierarchy. A factorisation
         takes longer and solves faster: many steps of a planar network pay for it far beyond the default.
     restart : MarchState, optional
-        A state at one of the times, to go on from; the initial values are still those of the start.
+        A state at one of the times, to go on from; all other arguments are those of the start.
     progress : callable, optional
         Told the time after every step.
 

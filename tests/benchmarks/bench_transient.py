@@ -69,9 +69,10 @@ def implicit_steps(count: int) -> None:
         )
         *_, last = march_it
         step = float(np.median(np.diff(told)))
+        kind = "multigrid" if level < disks else "factors  "
         first = told[0] - begin
         print(
-            f"{disks:8d} disks  {scheme:15s} {'multigrid' if level < disks else 'factors  '}  system {build:7.2f} s, set-up and first step {first:7.2f} s, "
+            f"{disks:8d} disks  {scheme:15s} {kind}  system {build:7.2f} s, set-up and first step {first:7.2f} s, "
             f"a step {step:8.4f} s, {last.iterations / last.steps:5.1f} iterations, "
             f"imbalance {abs(last.imbalance) / last.stored:.1e} of the heat stored"
         )
