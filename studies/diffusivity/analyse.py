@@ -1,8 +1,8 @@
 """Does a packing warm up like a slab, and is its diffusivity k_eff/(rho c)_eff?
 
-``python studies/diffusivity/analyse.py [--largest 4096] [--output DIRECTORY]`` heats packings of growing size from one
-wall, fits the exact series of the slab to their mean temperatures, compares the diffusivity with that of the steady
-state of the same pipe network, and writes table.csv and figure.png.
+``python studies/diffusivity/analyse.py [--largest 4096] [--disks 40000] [--output DIRECTORY]`` heats packings
+of growing size from either wall, fits the exact series of the slab to their mean temperatures, compares the diffusivity
+with that of the steady state of the same pipe network, and writes table.csv and figure.png.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from etc_engine.transient.diffusivity import WINDOW, Diffusivity, effective_diff
 HERE = Path(__file__).parent
 SEED = 20264
 SIZES = (16, 64, 256, 1024, 4096)
-DISKS_IN_ALL = 40_000  # a size: enough realizations to see the spread
 DENSITY, COORDINATION, HALF_ANGLE = 0.75, 4.8, 5.0
 
 
@@ -37,11 +36,11 @@ def measure(count: int, number: int) -> Pair:
     return effective_diffusivity(network, heated="left"), effective_diffusivity(network, heated="right")
 
 
-def run(largest: int) -> dict[int, list[Pair]]:
+def run(largest: int, disks: int) -> dict[int, list[Pair]]:
     """All realizations of every size."""
     found: dict[int, list[Pair]] = {}
     for count in (n for n in SIZES if n <= largest):
-        realizations = int(np.clip(DISKS_IN_ALL // count, 4, 60))
+        realizations = int(np.clip(disks // count, 4, 60))
         found[count] = [measure(count, number) for number in range(realizations)]
         row = summary(count, found[count])
         print(
@@ -99,9 +98,10 @@ def draw(found: dict[int, list[Pair]], path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--largest", type=int, default=4096)
+    parser.add_argument("--disks", type=int, default=40_000, help="of a size, in 4 to 60 realizations")
     parser.add_argument("--output", type=Path, default=HERE)
     arguments = parser.parse_args()
-    found = run(arguments.largest)
+    found = run(arguments.largest, arguments.disks)
     with (arguments.output / "table.csv").open("w", newline="") as file:
         rows = [summary(count, sample) for count, sample in found.items()]
         writer = csv.writer(file, lineterminator="\n")

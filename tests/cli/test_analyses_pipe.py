@@ -36,7 +36,7 @@ def test_feng2009(tmp_path):
 
 @pytest.mark.slow
 def test_diffusivity(tmp_path):
-    analyse("diffusivity", "--largest", 64, "--output", tmp_path)
+    analyse("diffusivity", "--largest", 64, "--disks", 800, "--output", tmp_path)
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     with (tmp_path / "table.csv").open() as file:
         small, larger = csv.DictReader(file)

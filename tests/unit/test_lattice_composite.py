@@ -13,7 +13,9 @@ from etc_engine.lattice.homogenize import composite_lattice, homogenize_lattice
 from etc_engine.lattice.phases import find_phases, phase_conductivity
 from etc_engine.lattice.tessellation import laguerre_facets
 from etc_engine.models.arrays import fcc, simple_cubic
+from etc_engine.packing.lubachevsky_stillinger import compress
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.voxel.homogenize import homogenize_voxel
 
 CUBE = Box((1.0, 1.0, 1.0), (True, True, True))
 CENTRE = [[0.5, 0.5, 0.5]]
@@ -76,6 +78,18 @@ def test_face_centred_cubic_array_converges_with_order_two():
     ]
     assert errors[1] < 1.5e-3
     assert errors[1] < 0.5 * errors[0]  # half the spacing
+
+
+@pytest.mark.parametrize(("contrast", "boundary"), [(7.7, "walls"), (0.05, "periodic")])
+def test_random_spheres_conduct_as_by_fft(contrast, boundary):
+    """An independent method under the same conditions; both are within their error estimates."""
+    packing = compress(np.ones(8), CUBE, rng(31), density=0.3).packing
+    composite = Composite(packing, 1.0, contrast)
+    lattice = homogenize_lattice(composite, rng=rng(), particles=8000, boundary=boundary)
+    fft = homogenize_voxel(composite, resolution=32, boundary=boundary)
+    difference = np.abs(np.diag(lattice.tensor) / np.diag(fft.tensor) - 1.0).max()
+    assert difference < 6e-3
+    assert difference < lattice.relative_error_estimate + fft.relative_error_estimate
 
 
 def test_a_matrix_of_inclusions_is_homogeneous():
