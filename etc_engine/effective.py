@@ -8,17 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from etc_engine.box import AXES, Box
+from etc_engine.box import AXES
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.angle_curve import solve_angle_curve
 from etc_engine.dtem.bounds import energy_bounds
-from etc_engine.dtem.resistance import self_resistance
 from etc_engine.dtem.steady import SteadySolution, solve_steady
-from etc_engine.errors import ConvergenceError
-from etc_engine.percolation import Backbone, find_backbone
-
-# The wall flows of a solution must agree with its energy and with each other to this part of the flux.
-BALANCE = 1e-6
+from etc_engine.percolation import Backbone, asked_groups, find_backbones, load_groups
+from etc_engine.pipe.conductances import pipe_conductances
+from etc_engine.pipe.steady import check_balance
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,31 +57,6 @@ class EffectiveConductivity:
         return "".join(AXES[axis] for axis, flag in enumerate(self.spans) if flag is False)
 
 
-def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
-    """Load axes that share a matrix: each walled axis alone, all periodic axes together if no axis is walled.
-
-    Beside a walled axis a periodic one has a system of its own too, because the walls drive only their axis.
-
-    Examples
-    --------
-    >>> load_groups(Box((1.0, 1.0), (True, True))), load_groups(Box((1.0, 1.0), (False, True)))
-    (((0, 1),), ((0,), (1,)))
-    """
-    periodic = tuple(axis for axis in range(box.dimension) if box.periodic[axis])
-    walled = tuple((axis,) for axis in range(box.dimension) if not box.periodic[axis])
-    return tuple(sorted(walled + ((periodic,) if periodic else ())))
-
-
-def find_backbones(network: ContactNetwork, axes: tuple[int, ...] | None = None) -> dict[tuple[int, ...], Backbone]:
-    """Backbone of every load group; shared by all contact angles and methods on one network."""
-    return {group: find_backbone(network, group) for group in _asked_groups(network.packing.box, axes)}
-
-
-def _asked_groups(box: Box, axes: tuple[int, ...] | None) -> tuple[tuple[int, ...], ...]:
-    groups = load_groups(box)
-    return groups if axes is None else tuple(group for group in groups if set(group) & set(axes))
-
-
 def effective_conductivity(
     network: ContactNetwork,
     *,
@@ -121,6 +93,7 @@ def effective_conductivity(
 
     Examples
     --------
+    >>> from etc_engine.box import Box
     >>> from etc_engine.contacts import bonded_contacts
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
@@ -133,7 +106,7 @@ def effective_conductivity(
     tensor = np.full((box.dimension, box.dimension), np.nan)
     spans: list[bool | None] = [None] * box.dimension
     solutions = []
-    for group in _asked_groups(box, axes):
+    for group in asked_groups(box, axes):
         solution = solve_steady(
             network,
             group,
@@ -151,7 +124,7 @@ def effective_conductivity(
             tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume * spanned
         else:
             axis = group[0]
-            _check_balance(solution)
+            check_balance(*wall_heat_flows(solution), float(solution.energies[0, 0]))
             tensor[axis, axis] = solution.energies[0, 0] * box.lengths[axis] / box.cross_section(axis)
         solutions.append(solution)
     return EffectiveConductivity(tensor, tuple(spans), tuple(solutions))
@@ -221,6 +194,7 @@ def conductivity_curve(
 
     Examples
     --------
+    >>> from etc_engine.box import Box
     >>> from etc_engine.contacts import bonded_contacts
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
@@ -307,6 +281,7 @@ def conductivity_bounds(result: EffectiveConductivity) -> NDArray[np.float64]:
 
     Examples
     --------
+    >>> from etc_engine.box import Box
     >>> from etc_engine.contacts import bonded_contacts
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
@@ -331,17 +306,6 @@ def wall_heat_flows(solution: SteadySolution) -> tuple[float, float]:
     return float(solution.heat_flows[hot, 0].sum()), -float(solution.heat_flows[cold, 0].sum())
 
 
-def _check_balance(solution: SteadySolution) -> None:
-    energy = float(solution.energies[0, 0])
-    heat_in, heat_out = wall_heat_flows(solution)
-    error = max(abs(heat_in - heat_out), abs(heat_in - energy))
-    if error > BALANCE * abs(energy):
-        raise ConvergenceError(
-            f"the heat flows do not balance: {heat_in:.10g} in, {heat_out:.10g} out, energy {energy:.10g}; "
-            f"ask for a smaller tolerance"
-        )
-
-
 def mean_field_conductivity(
     network: ContactNetwork,
     *,
@@ -358,7 +322,7 @@ def mean_field_conductivity(
     network, conductivity, contact_resistance
         As in `effective_conductivity`.
     resistance : str
-        Self-resistance h_ii of a pipe, a method with one in closed form.
+        As in `etc_engine.pipe.conductances.pipe_conductances`.
 
     Returns
     -------
@@ -371,16 +335,15 @@ def mean_field_conductivity(
 
     Examples
     --------
+    >>> from etc_engine.box import Box
     >>> from etc_engine.contacts import bonded_contacts
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
     >>> round(mean_field_conductivity(bonded_contacts(disk, 0.1)), 6)
     0.429587
     """
-    n, m = network.packing.count, network.count
-    kappa = np.broadcast_to(np.asarray(conductivity, dtype=np.float64), (n,))
-    contact = np.broadcast_to(np.asarray(contact_resistance, dtype=np.float64), (m + network.walls.size,))
-    sides = self_resistance(network.angles, resistance) / kappa[network.pairs]
-    conductance = 1.0 / (sides.sum(axis=1) + contact[:m])
+    conductances, _ = pipe_conductances(
+        network, resistance=resistance, conductivity=conductivity, contact_resistance=contact_resistance
+    )
     squares = (network.branches**2).sum(axis=1)
-    return float(conductance @ squares / (2.0 * network.packing.box.volume))
+    return float(conductances @ squares / (2.0 * network.packing.box.volume))

@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.box import Box
 from etc_engine.contacts import ContactNetwork
 
 
@@ -106,6 +107,32 @@ def restore_dead_ends(network: ContactNetwork, backbone: Backbone) -> Backbone:
         contacts=in_play[backbone.clusters[ends]],
         wall_contacts=driven_walls & in_play[backbone.clusters[walls]],
     )
+
+
+def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
+    """Load axes that share a matrix: each walled axis alone, all periodic axes together if no axis is walled.
+
+    Beside a walled axis a periodic one has a system of its own too, because the walls drive only their axis.
+
+    Examples
+    --------
+    >>> load_groups(Box((1.0, 1.0), (True, True))), load_groups(Box((1.0, 1.0), (False, True)))
+    (((0, 1),), ((0,), (1,)))
+    """
+    periodic = tuple(axis for axis in range(box.dimension) if box.periodic[axis])
+    walled = tuple((axis,) for axis in range(box.dimension) if not box.periodic[axis])
+    return tuple(sorted(walled + ((periodic,) if periodic else ())))
+
+
+def find_backbones(network: ContactNetwork, axes: tuple[int, ...] | None = None) -> dict[tuple[int, ...], Backbone]:
+    """Backbone of every load group; shared by all contact angles and methods on one network."""
+    return {group: find_backbone(network, group) for group in asked_groups(network.packing.box, axes)}
+
+
+def asked_groups(box: Box, axes: tuple[int, ...] | None) -> tuple[tuple[int, ...], ...]:
+    """Load groups that hold one of the axes asked for; all by default."""
+    groups = load_groups(box)
+    return groups if axes is None else tuple(group for group in groups if set(group) & set(axes))
 
 
 @njit(cache=True)

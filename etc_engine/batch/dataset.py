@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     import xarray
 
 Values = dict[str, NDArray[Any]]
-CELL = ("density", "contact_angle", "method", "realization")
+SWEPT = ("density", "contact_angle", "contrast", "method")
+"""The dimensions of the cells; a result has those its study varies, and always ``density``."""
+
 UNIT = ("density", "realization")
 TENSOR = ("direction_i", "direction_j")
 INCIDENTAL = ("_seconds", "_rank", "_host", "_time")
@@ -39,7 +41,19 @@ STREAM_COMMENT = (
     "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
     "of the density as a double (NaN: the packer's own); stored is generate_state(1, uint64) of the sequence"
 )
-ANGLE_COMMENT = "half of the angle that the contact arc subtends at the centre of a disk; not a wetting angle"
+VARIANTS = {
+    "contact_angle": {
+        "long_name": "contact half-angle",
+        "units": "degree",
+        "comment": "half of the angle that the contact arc subtends at the centre of a disk; not a wetting angle",
+    },
+    "contrast": {
+        "long_name": "contrast",
+        "units": "1",
+        "comment": "conductivity of the particles over that of the matrix",
+    },
+}
+"""Attributes of the second axis of a sweep."""
 
 
 def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarray.Dataset:
@@ -57,29 +71,32 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     Returns
     -------
     xarray.Dataset
-        Dimensions ``density``, ``contact_angle`` (only where angles are prescribed), ``method`` (only where
-        the study lists methods), ``realization``, ``direction_i``, ``direction_j``.
+        Dimensions ``density``, ``contact_angle`` or ``contrast`` (only where the study gives some), ``method`` (only
+        where it lists methods), ``realization``, ``direction_i``, ``direction_j``.
     """
     import xarray
 
     cells, units = _cell_values(study, table), _unit_values(study, table)
+    variant, values = study.variants
+    swept = ("density", variant, "method")
+    cell = (*swept, "realization")
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
-    dataset["conductivity"] = (CELL + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
+    dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
     if "exact" in study.conduction.methods:
         meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
-        dataset["conductivity_bounds"] = ((*CELL, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
+        dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
     for name, variable in CELL_VARIABLES.items():
-        dataset[name] = (CELL, cells[name], variable.attributes)
-    dataset["status"] = (CELL, cells["status"], _status_attributes())
-    dataset["message"] = (CELL, cells["message"], {"long_name": "what went wrong, in words"})
+        dataset[name] = (cell, cells[name], variable.attributes)
+    dataset["status"] = (cell, cells["status"], _status_attributes())
+    dataset["message"] = (cell, cells["message"], {"long_name": "what went wrong, in words"})
     for name, variable in UNIT_VARIABLES.items():
         dataset[name] = (UNIT, units[name], variable.attributes)
     dataset["random_stream"].attrs["comment"] = STREAM_COMMENT
-    _add_statistics(dataset, cells, study.statistics.confidence)
-    if study.contacts.contact_angle is None:
-        dataset = dataset.isel(contact_angle=0, drop=True)
+    _add_statistics(dataset, swept, cells, study.statistics.confidence)
+    if values is None:
+        dataset = dataset.isel({variant: 0}, drop=True)
     if isinstance(study.conduction.method, str):
         dataset = dataset.isel(method=0, drop=True)
     return dataset
@@ -92,10 +109,10 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
         reached = packing_density[np.isfinite(packing_density)]
         density = (float(reached.mean()) if reached.size else np.nan,)
         comment += "; the packer's own, mean over realizations"
-    degrees = {"long_name": "contact half-angle", "units": "degree", "comment": ANGLE_COMMENT}
+    variant, values = study.variants
     return {
         "density": ("density", np.array(density), {"long_name": "density", "units": "1", "comment": comment}),
-        "contact_angle": ("contact_angle", np.array(study.contacts.contact_angle or (np.nan,)), degrees),
+        variant: (variant, np.array(values or (np.nan,)), VARIANTS[variant]),
         "method": ("method", np.array(study.conduction.methods, dtype=object), {"long_name": "method"}),
         "realization": (
             "realization",
@@ -112,10 +129,10 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
 
 
 def _cell_values(study: Study, table: Table) -> Values:
-    """Arrays over (density, contact_angle, method, realization)."""
+    """Arrays over (density, contact angle or contrast, method, realization)."""
     rows, d = table.rows, study.box.dimension
-    angles, methods = rows.dtype["status"].shape
-    shape = (len(study.densities), angles, methods, study.statistics.cap)
+    variants, methods = rows.dtype["status"].shape
+    shape = (len(study.densities), variants, methods, study.statistics.cap)
     values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in CELL_VARIABLES.items()}
     values["conductivity"] = np.full((*shape, d, d), np.nan)
     values["conductivity_bounds"] = np.full((*shape, d, 2), np.nan)
@@ -137,7 +154,7 @@ def _unit_values(study: Study, table: Table) -> Values:
     return values
 
 
-def _add_statistics(dataset: xarray.Dataset, cells: Values, confidence: float) -> None:
+def _add_statistics(dataset: xarray.Dataset, swept: tuple[str, ...], cells: Values, confidence: float) -> None:
     """Statistics over the realizations that have a conductivity, 0 of a non-percolating one included."""
     valid = cells["status"] <= Status.NOT_PERCOLATING
     shape, tensor = valid.shape[:-1], cells["conductivity"].shape[-2:]
@@ -155,9 +172,9 @@ def _add_statistics(dataset: xarray.Dataset, cells: Values, confidence: float) -
                 "confidence_level": confidence,
                 "comment": "Student t with count - 1 degrees of freedom",
             }
-        dataset[f"conductivity_{name}"] = (CELL[:-1] + TENSOR, values[name], attributes)
+        dataset[f"conductivity_{name}"] = (swept + TENSOR, values[name], attributes)
     dataset["count"] = (
-        CELL[:-1],
+        swept,
         count,
         {"long_name": "realizations that enter the statistics: ok and not_percolating", "units": "1"},
     )

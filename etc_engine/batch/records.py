@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from etc_engine.batch.plan import Unit
-from etc_engine.realization import Cell, Realization, Status
+from etc_engine.realization import Cell, Realization, RealizationSpec, Status
+from etc_engine.realization.outcome import uniform_cells
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,12 @@ class Record:
         return sum(cell.status > Status.NOT_PERCOLATING for row in self.result.cells for cell in row)
 
 
-def failed_realization(error: Exception, angles: int, methods: int, dimension: int) -> Realization:
+def failed_realization(error: Exception, spec: RealizationSpec, dimension: int) -> Realization:
     """The result of a unit that raised: every cell has status ERROR and says why."""
     message = _steady(f"{type(error).__name__}: {error}")
     nowhere = np.full((dimension, dimension), np.nan)
     cell = Cell(Status.ERROR, message, conductivity=nowhere)
-    return Realization(0, np.nan, np.nan, 0.0, ((cell,) * methods,) * angles)
+    return Realization(0, np.nan, np.nan, 0.0, uniform_cells(spec, cell))
 
 
 def _steady(message: str) -> str:

@@ -232,8 +232,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     try:
         result = realize(spec, unit_rng(study.seed, unit))
     except Exception as error:
-        angles, methods = len(spec.contacts.contact_angles) or 1, len(spec.conduction.methods)
-        result = failed_realization(error, angles, methods, study.box.dimension)
+        result = failed_realization(error, spec, study.box.dimension)
     return Record(unit, result, rank, socket.gethostname(), started, time.time())
 
 

@@ -41,6 +41,9 @@ CELL_VARIABLES = {
     "unknowns": Variable(np.int64, -1, "number of unknowns of the linear system, after pruning"),
     "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
     "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
+    "model_error_estimate": Variable(
+        np.float64, np.nan, "estimated relative error of the method: chord, if solved in full, and exact"
+    ),
     "mean_field_conductivity": Variable(
         np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
     ),
@@ -71,10 +74,10 @@ class Table:
     Parameters
     ----------
     rows : ndarray, shape (n,)
-        Fields ``density_index``, ``realization``, the names of `UNIT_VARIABLES`, and with shape (angles, methods)
-        those of `CELL_VARIABLES`, ``status`` and ``conductivity`` (there (angles, methods, d, d)).
+        Fields ``density_index``, ``realization``, the names of `UNIT_VARIABLES`, and with shape (variants, methods)
+        those of `CELL_VARIABLES`, ``status`` and ``conductivity`` (there (variants, methods, d, d)).
     messages : dict
-        (density index, realization, angle, method) -> what went wrong.
+        (density index, realization, variant, method) -> what went wrong.
     """
 
     rows: NDArray[Any]
@@ -88,7 +91,7 @@ class Table:
 
 def row_type(study: Study) -> np.dtype[Any]:
     """The numpy type of a row."""
-    cells = (len(study.contacts.contact_angle or (None,)), len(study.conduction.methods))
+    cells = (len(study.variants[1] or (None,)), len(study.conduction.methods))
     d = study.box.dimension
     fields: list[Any] = [("density_index", np.int64), ("realization", np.int64)]
     fields += [(name, WORD if v.dtype is object else v.dtype) for name, v in UNIT_VARIABLES.items()]

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 EXIT_BOUND_BROKEN = 3
 COLUMN = 18
-CELL = ("density", "contact_angle", "method")
 
 
 @click.command("compare")
@@ -27,7 +26,8 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     """Compare the sweep in RESULT (netCDF) with conductivity models.
 
     Prints the simulated mean with its confidence half-width beside every model of the study, and constants fitted
-    over the density. Exit status 3 if a rigorous bound is broken, which can happen to overlapping particles only.
+    over the density. Exit status 3 if a rigorous bound is broken, which can happen to overlapping particles and to
+    composites only.
     """
     from etc_engine.batch.dataset import open_dataset
     from etc_engine.cli.options import check_picture, check_place, print_json, replacing
@@ -63,7 +63,9 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
 
 def _cells(comparison: xarray.Dataset) -> list[tuple[dict[str, Any], xarray.Dataset]]:
     """Every cell of the sweep with its labels, densities outermost."""
-    dims = [dim for dim in CELL if dim in comparison["conductivity_mean"].dims]
+    from etc_engine.batch.dataset import SWEPT
+
+    dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]
     indices = itertools.product(*(range(comparison.sizes[dim]) for dim in dims))
     picked = [dict(zip(dims, index, strict=True)) for index in indices]
     return [
@@ -118,7 +120,9 @@ def _cell_record(labels: dict[str, Any], cell: xarray.Dataset) -> dict[str, Any]
 def _print_head(result: Path, comparison: xarray.Dataset) -> None:
     level = comparison["half_width"].attrs["confidence_level"]
     particles, pores = comparison.attrs["particle_conductivity"], comparison.attrs["pore_conductivity"]
-    click.echo(f"{result}: particles of {particles:g} W/(m K), pores of {pores:g} W/(m K)")
+    conduct = ", ".join(f"{value:g}" for value in ([particles] if isinstance(particles, float) else particles))
+    around = "a matrix" if comparison.attrs["composite"] else "pores"
+    click.echo(f"{result}: particles of {conduct} W/(m K), {around} of {pores:g} W/(m K)")
     click.echo(
         "simulation: mean of the tensor's diagonal over n realizations +- half-width of its "
         f"{100 * level:g} % Student-t interval [W/(m K)]"
@@ -135,9 +139,16 @@ def _shown(comparison: xarray.Dataset) -> list[str]:
 
 
 def _print_table(comparison: xarray.Dataset) -> None:
+    from etc_engine.batch.dataset import SWEPT
+
     shown = _shown(comparison)
-    dims = [dim for dim in CELL if dim in comparison["conductivity_mean"].dims]
-    heads = {"density": ["density"], "contact_angle": ["contact", "angle"], "method": ["method"]}
+    dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]
+    heads = {
+        "density": ["density"],
+        "contact_angle": ["contact", "angle"],
+        "contrast": ["contrast"],
+        "method": ["method"],
+    }
     columns = [heads[dim] for dim in dims] + [["solid", "fraction"], ["n"]]
     narrow = [10 if dim == "method" else 9 for dim in dims] + [9, 5]
     models = [name.split("_") for name in shown]
@@ -186,12 +197,13 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
         click.echo(
             f"{failed} cells failed and stay out of the means (status 2 to 4, reasons in `message`): a selection"
         )
+    bound = "composites" if comparison.attrs["composite"] else "overlapping particles"
     if not comparison.attrs["bounds_bind"]:
         click.echo("bounds: a comparison only; Hashin-Shtrikman bounds bind overlapping geometries, not bonded ones")
     elif comparison.attrs["bound_broken"]:
-        click.echo("bounds: they bind overlapping particles, and are broken")
+        click.echo(f"bounds: they bind {bound}, and are broken")
     else:
-        click.echo("bounds: they bind overlapping particles, and every mean and realization keeps them")
+        click.echo(f"bounds: they bind {bound}, and every mean and realization keeps them")
     best = comparison.attrs["best_model"]
     if best:
         rms = comparison["rms_relative_difference"].sel({"model": best})

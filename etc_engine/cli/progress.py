@@ -57,10 +57,11 @@ class Progress:
 
 
 class PackingProgress:
-    """Shows the fraction of a packing that is done as a bar on a terminal's stderr; nothing elsewhere."""
+    """Shows the fraction of a packing, or of other work, as a bar on a terminal's stderr; nothing elsewhere."""
 
-    def __init__(self) -> None:
+    def __init__(self, work: str = "packing") -> None:
         self._bar: Any = None
+        self._work = work
 
     def report(self, fraction: float) -> None:
         """Take in the fraction done; what was shown never shrinks."""
@@ -71,7 +72,7 @@ class PackingProgress:
 
             form = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
             self._bar = tqdm.tqdm(
-                desc="packing", total=1.0, delay=BAR_DELAY, bar_format=form, leave=False, file=sys.stderr
+                desc=self._work, total=1.0, delay=BAR_DELAY, bar_format=form, leave=False, file=sys.stderr
             )
         self._bar.update(max(0.0, fraction - self._bar.n))
 

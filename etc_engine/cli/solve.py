@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from etc_engine.contacts import ContactNetwork
     from etc_engine.dtem.field import ParticleField
     from etc_engine.effective import EffectiveConductivity
     from etc_engine.packing.files import ParticleTable
+    from etc_engine.pipe.steady import PipeConductivity
 
 
 BOND_GAP = 1e-6
@@ -26,7 +29,8 @@ BOND_GAP = 1e-6
 @click.option("--box", help="Edge lengths, such as 1,1; only for CSV.")
 @click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere; only for CSV.")
 @click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
-@click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced, arc or exact.")
+@click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced, arc, exact or pipe.")
+@click.option("--pipe-resistance", help="Resistance of a pipe, with --method pipe: chord (the default) or uniform.")
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
@@ -52,6 +56,7 @@ def solve_command(
     periodic: str | None,
     frame: int | None,
     method: str,
+    pipe_resistance: str | None,
     modes: int | None,
     contact_angle: float | None,
     bond_gap: float,
@@ -73,12 +78,15 @@ def solve_command(
 
     from etc_engine.cli.options import print_json
     from etc_engine.contacts import bonded_contacts, overlap_contacts
-    from etc_engine.dtem.field import recover_field
-    from etc_engine.effective import effective_conductivity
     from etc_engine.errors import InputError
+    from etc_engine.pipe.steady import PipeConductivity
 
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
+    if method != "pipe" and pipe_resistance is not None:
+        raise InputError(f"--pipe-resistance goes with --method pipe, found --method {method}")
+    if method == "pipe" and modes is not None:
+        raise InputError("--modes goes with --method exact or arc: a pipe has one heat flow")
     if contact_angle is None and bond_gap != BOND_GAP:
         raise InputError("--bond-gap goes with --contact-angle, which is missing: overlaps have no gap")
     table = _read(particles, box, periodic, frame)
@@ -89,17 +97,18 @@ def solve_command(
         network = overlap_contacts(table.packing)
     else:
         network = bonded_contacts(table.packing, radians(contact_angle), bond_gap)
-    result = effective_conductivity(
-        network,
-        method=method,
-        conductivity=given if table.conductivity is None else table.conductivity,
-        contact_resistance=contact_resistance,
-        modes=modes,
-        axes=(0, 1) if all(table.packing.box.periodic) else (0,),
+    asked = _Asked(
+        table.packing.box.periodic,
+        method,
+        pipe_resistance or "chord",
+        modes,
+        given if table.conductivity is None else table.conductivity,
+        contact_resistance,
     )
-    field = recover_field(result.solutions[0])
-    record = _record(network, method, result, field)
-    _warn_of_close_arcs(method, result)
+    result, field = asked.solve(network)
+    record = _record(network, asked, result, field)
+    if not isinstance(result, PipeConductivity):
+        _warn_of_close_arcs(method, result)
     _warn_of_missing_contacts(network, contact_angle, bond_gap)
     _write(outputs, result, field, record)
     record["seconds"] = time.perf_counter() - start
@@ -107,6 +116,46 @@ def solve_command(
         print_json(record)
     else:
         _print_table(record)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The physics asked for."""
+
+    periodic: tuple[bool, ...]
+    method: str
+    pipe_resistance: str
+    modes: int | None
+    conductivity: ArrayLike
+    contact_resistance: float
+
+    def solve(self, network: ContactNetwork) -> tuple[EffectiveConductivity | PipeConductivity, ParticleField]:
+        """Conductivity, and the field of the load along x."""
+        axes = (0, 1) if all(self.periodic) else (0,)
+        if self.method == "pipe":
+            from etc_engine.pipe.field import pipe_field
+            from etc_engine.pipe.steady import pipe_conductivity
+
+            pipes = pipe_conductivity(
+                network,
+                resistance=self.pipe_resistance,
+                conductivity=self.conductivity,
+                contact_resistance=self.contact_resistance,
+                axes=axes,
+            )
+            return pipes, pipe_field(pipes.solutions[0])
+        from etc_engine.dtem.field import recover_field
+        from etc_engine.effective import effective_conductivity
+
+        elements = effective_conductivity(
+            network,
+            method=self.method,
+            conductivity=self.conductivity,
+            contact_resistance=self.contact_resistance,
+            modes=self.modes,
+            axes=axes,
+        )
+        return elements, recover_field(elements.solutions[0])
 
 
 def _read(particles: Path, box: str | None, periodic: str | None, frame: int | None) -> ParticleTable:
@@ -151,7 +200,12 @@ class _Outputs:
                 check_place(path, particles)
 
 
-def _write(outputs: _Outputs, result: EffectiveConductivity, field: ParticleField, record: dict[str, Any]) -> None:
+def _write(
+    outputs: _Outputs,
+    result: EffectiveConductivity | PipeConductivity,
+    field: ParticleField,
+    record: dict[str, Any],
+) -> None:
     """Write what was asked for: every file whole, or none of them."""
     from etc_engine.cli.options import replacing
 
@@ -217,21 +271,27 @@ def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | No
 
 
 def _record(
-    network: ContactNetwork, method: str, result: EffectiveConductivity, field: ParticleField
+    network: ContactNetwork,
+    asked: _Asked,
+    result: EffectiveConductivity | PipeConductivity,
+    field: ParticleField,
 ) -> dict[str, Any]:
     from etc_engine.dtem.model_error import chord_error_estimate
     from etc_engine.effective import conductivity_bounds
+    from etc_engine.pipe.steady import PipeConductivity
     from etc_engine.realization import Status
 
     percolates = bool(result.spans[0])
-    record: dict[str, Any] = {"method": method, "conductivity": float(result.tensor[0, 0])}
+    record: dict[str, Any] = {"method": asked.method, "conductivity": float(result.tensor[0, 0])}
     if all(network.packing.box.periodic):
         record["conductivity_tensor"] = result.tensor
-    if method == "exact":
+    if isinstance(result, PipeConductivity):
+        record["pipe_resistance"] = asked.pipe_resistance
+    elif asked.method == "exact":
         bounds = conductivity_bounds(result)[0]
         record["conductivity_bounds"] = bounds
         record["model_error_estimate"] = float(bounds[1] / bounds[0] - 1.0) if percolates else 0.0
-    if method == "chord":
+    elif asked.method == "chord":
         record["model_error_estimate"] = chord_error_estimate(result.solutions[0])
     return record | {
         "particles": network.packing.count,

@@ -2,39 +2,127 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 import tomllib
-from importlib import import_module
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from etc_engine.errors import OutputError, StudyError
+from etc_engine.errors import InputError, OutputError, StudyError
 
-if TYPE_CHECKING:
-    import xarray
+EXIT_RESUMABLE = 75
 
-#: kind of study -> "module:function", a function from the parsed TOML file to a dataset.
-KINDS = {"meshless": "etc_engine.meshless.study:run_study"}
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the command line asks for besides the study."""
+
+    study: Path
+    text: str
+    output: Path
+    resume: bool
+    overwrite: bool
+    plot: Path | None
+    vtk: Path | None
 
 
 @click.command("transient")
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "output", required=True, type=click.Path(path_type=Path), help="netCDF file to write.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing output file.")
-def transient_command(study: Path, output: Path, overwrite: bool) -> None:
+@click.option("--overwrite", is_flag=True, help="Replace an existing output file, or states of one.")
+@click.option("--resume", is_flag=True, help="Go on from the last written state (kind network).")
+@click.option("--plot", type=click.Path(path_type=Path), help="Panel picture (kind network).")
+@click.option("--vtk", type=click.Path(path_type=Path), help="VTK series (.pvd) for ParaView (kind network).")
+def transient_command(
+    study: Path, output: Path, overwrite: bool, resume: bool, plot: Path | None, vtk: Path | None
+) -> int:
     """Run the transient STUDY (a TOML file with schema and kind) and write the fields to a netCDF file."""
     content, text = read_study(study)
-    if output.exists() and not overwrite:
+    if overwrite and resume:
+        raise InputError("--resume goes on with what is there and --overwrite replaces it: choose one")
+    if output.exists() and not (overwrite or resume):
         raise OutputError(f"{output} exists: choose another name or give --overwrite")
     if not output.parent.is_dir():
         raise OutputError(f"the folder {output.parent} does not exist: create it first")
-    module, function = KINDS[content["kind"]].split(":")
-    result = getattr(import_module(module), function)(content)
-    write_dataset(result.assign_attrs(study_file=text), output)
-    click.echo(f"{output}: {dict(result.sizes)}", err=True)
+    return KINDS[content["kind"]](content, Wanted(study, text, output, resume, overwrite, plot, vtk))
+
+
+def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
+    from etc_engine.cli.options import replacing
+    from etc_engine.meshless.study import run_study
+
+    for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
+        if given:
+            raise InputError(f"{name} goes with studies of kind 'network', this one is of kind 'meshless'")
+    result = run_study(content)
+    with replacing(wanted.output) as file:
+        result.assign_attrs(study_file=wanted.text).to_netcdf(file)
+    click.echo(f"{wanted.output}: {dict(result.sizes)}", err=True)
+    return 0
+
+
+def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
+    from etc_engine.cli.options import check_picture, check_place, replacing
+    from etc_engine.cli.progress import PackingProgress
+    from etc_engine.results.series import series_dataset, write_vtk_series
+    from etc_engine.transient.run import run_transient
+    from etc_engine.transient.states import remove_states, state_folder
+    from etc_engine.transient.study import parse_study
+
+    if wanted.plot is not None:
+        check_picture(wanted.plot)
+    if wanted.vtk is not None and wanted.vtk.suffix != ".pvd":
+        raise InputError(f"a VTK series is written to a .pvd file, found {str(wanted.vtk)!r}")
+    for path in (wanted.output, wanted.plot, wanted.vtk):
+        if path is not None:
+            check_place(path, wanted.study)
+    if wanted.resume and wanted.output.exists() and not state_folder(wanted.output).exists():
+        click.echo(f"{wanted.output} is complete: nothing is left to do", err=True)
+        return 0
+    if state_folder(wanted.output).exists() and not (wanted.resume or wanted.overwrite):
+        raise OutputError(f"{state_folder(wanted.output)} holds states of a former run: give --resume or --overwrite")
+    study = parse_study(content)
+    try:
+        with PackingProgress("marching") as progress:
+            done = run_transient(
+                study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report
+            )
+    except InputError:
+        if not wanted.resume:  # what was refused leaves nothing behind
+            remove_states(wanted.output)
+        raise
+    if done.stopped:
+        click.echo(
+            f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {done.times.size} states are "
+            f"kept, go on with --resume",
+            err=True,
+        )
+        return EXIT_RESUMABLE
+    series = series_dataset(done, wanted.text)
+    if wanted.plot is not None:
+        from etc_engine.figures.transient import save_transient
+
+        with replacing(wanted.plot) as file:
+            save_transient(series, file)
+    if wanted.vtk is not None:
+        write_vtk_series(wanted.vtk, series)
+    with replacing(wanted.output) as file:
+        series.to_netcdf(file)
+    remove_states(wanted.output)
+    last = done.states[-1]
+    click.echo(
+        f"{wanted.output}: {done.network.packing.count} particles, {len(done.states)} times"
+        f"{f' ({done.resumed} of them from before)' if done.resumed else ''}, {last.steps} steps, "
+        f"heat stored {last.stored:.6g} J/m, imbalance {last.imbalance:.1e} J/m",
+        err=True,
+    )
+    return 0
+
+
+KINDS: dict[str, Callable[[dict[str, Any], Wanted], int]] = {"meshless": _run_meshless, "network": _run_network}
+"""What runs a study, by its kind; answers the exit status."""
 
 
 def read_study(path: Path) -> tuple[dict[str, Any], str]:
@@ -58,24 +146,3 @@ def read_study(path: Path) -> tuple[dict[str, Any], str]:
     if content.get("kind") not in KINDS:
         raise StudyError(f"{path}: kind = {content.get('kind')!r} is unknown: expected one of {', '.join(KINDS)}")
     return content, text
-
-
-def write_dataset(result: xarray.Dataset, output: Path) -> None:
-    """Write to a temporary file beside the output, then rename: a file is there whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the folder does not let itself be written to.
-    """
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{output.name}.", suffix=".tmp", dir=output.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            result.to_netcdf(temporary)
-            temporary.replace(output)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"{output} cannot be written: {error}") from error

@@ -32,6 +32,16 @@ DEFAULT_MODELS = (
     MEAN_FIELD,
 )
 
+COMPOSITE_MODELS = (
+    "hashin_shtrikman_lower",
+    "hashin_shtrikman_upper",
+    "maxwell",
+    "third_order",
+    "effective_medium",
+    "differential",
+)
+"""Those of a composite, whose particles need no contacts."""
+
 BINDING = ("series", "parallel", "hashin_shtrikman_lower", "hashin_shtrikman_upper")
 """Bounds of every isotropic two-phase medium; three-point bounds hold for their own zeta2 only."""
 
@@ -71,21 +81,22 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
 
     Notes
     -----
-    k1 is the study's ``pore_conductivity``, k2 the conductivity of the particles, the fraction the mean solid
-    fraction of the density. Where the pores insulate (k1 = 0) every model with the pores as its matrix is 0:
-    Maxwell, differential medium, lower Hashin-Shtrikman. The contact mean field is the sweep's own, on the
+    k1 is the study's ``pore_conductivity`` (of a composite, the matrix), k2 the conductivity of the particles, the
+    fraction the mean solid fraction of the density. Where the pores insulate (k1 = 0) every model with the pores as its
+    matrix is 0: Maxwell, differential medium, lower Hashin-Shtrikman. The contact mean field is the sweep's own, on the
     networks it solved; it takes the pipe resistance of the ``chord`` method whatever the method.
 
-    The bounds bind a body whose two phases are what the solid fraction says: overlapping disks. A bonded
-    contact conducts through a neck that the solid fraction does not count, so for it they are a comparison.
-    The Hashin-Shtrikman bounds are for the mean over isotropic ensembles; every single realization and
-    direction is held against the Wiener bounds (series, parallel) of its own solid fraction, which need no
-    isotropy. The simulated pores insulate: if the study gives them a conductivity, a simulation below the
-    lower bound says that their heat may not be left out.
+    The bounds bind a body whose two phases are what the solid fraction says: overlapping disks, and composites (there
+    beyond the interval of the mean and the estimated error of the discretization). A bonded contact conducts through a
+    neck that the solid fraction does not count, so for it they are a comparison. The Hashin-Shtrikman bounds are for
+    the mean over isotropic ensembles; every single realization and direction is held against the Wiener bounds (series,
+    parallel) of its own solid fraction, which need no isotropy. The pores of a contact network insulate: if the study
+    gives them a conductivity, a simulation below the lower bound says that their heat may not be left out.
     """
     import xarray
 
-    medium = phases(dataset)
+    media = phases(dataset)
+    medium = media[0]
     parameters = _with_bounds(_wanted(dataset, models))
     simulation = simulated(dataset)
     fraction = simulation["solid_fraction"]
@@ -96,9 +107,9 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
             columns.append(dataset["mean_field_conductivity"].where(valid).mean("realization"))
             notes.append("")
         else:
-            curve, note = model_curve(name, medium, fraction.values, values)
-            columns.append(fraction.copy(data=curve))
-            notes.append(note)
+            curves = [model_curve(name, one, fraction.values, values) for one in media]
+            columns.append(_by_contrast([fraction.copy(data=curve) for curve, _ in curves], simulation))
+            notes.append(next((note for _, note in curves if note), ""))
     result = simulation
     k = result["conductivity_mean"]
     labels = xarray.DataArray(np.array(list(parameters), dtype=object), dims="model", name="model")
@@ -112,16 +123,26 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
     )
     result.attrs |= {
         "pore_conductivity": medium.pores,
-        "particle_conductivity": medium.particles,
+        "particle_conductivity": medium.particles if len(media) == 1 else [one.particles for one in media],
+        "composite": int(medium.composite),
         "dimension": medium.dimension,
         "model_parameters": json.dumps({name: dict(values) for name, values in parameters.items()}),
     }
     _add_differences(result)
-    _add_bounds(result, dataset, medium)
+    _add_bounds(result, dataset, media)
     _add_best(result)
     for name, (meaning, units) in _MEANINGS.items():
         result[name].attrs |= {"long_name": meaning, "units": units}
     return result
+
+
+def _by_contrast(columns: Sequence[xarray.DataArray], simulation: xarray.Dataset) -> xarray.DataArray:
+    """One column, or one a contrast side by side."""
+    import xarray
+
+    if "contrast" not in simulation.dims:
+        return columns[0]
+    return xarray.concat(columns, dim=simulation["contrast"])
 
 
 def model_curve(
@@ -186,8 +207,9 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``model_conductivity`` on ``model`` and ``density``, with the solid fraction interpolated between the
-        densities of the sweep. Without the contact mean field, which has values on the sweep only.
+        ``model_conductivity`` on ``model``, ``density`` and, if there, ``contrast``, with the solid fraction
+        interpolated between the densities of the sweep. Without the contact mean field, which has values on the sweep
+        only.
     """
     import xarray
 
@@ -196,20 +218,26 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
     if known.sum() >= 2:
         fine = np.linspace(density[known][0], density[known][-1], points)
         density, fraction = fine, np.interp(fine, density[known], fraction[known])
-    overlapping = bool(comparison.attrs["bounds_bind"])
     attrs = comparison.attrs
-    medium = Phases(attrs["pore_conductivity"], attrs["particle_conductivity"], attrs["dimension"], overlapping)
+    media = [
+        Phases(attrs["pore_conductivity"], float(particles), attrs["dimension"], bool(attrs["bounds_bind"]))
+        for particles in np.atleast_1d(attrs["particle_conductivity"])
+    ]
     parameters = json.loads(attrs["model_parameters"])
     names = [str(name) for name in comparison["model"].values if str(name) != MEAN_FIELD]
-    values = np.array([model_curve(name, medium, fraction, parameters[name])[0] for name in names])
-    lines = xarray.Dataset({"model_conductivity": (("model", "density"), values)})
-    return lines.assign_coords(model=np.array(names, dtype=object), density=density)
+    values = np.array([[model_curve(name, one, fraction, parameters[name])[0] for one in media] for name in names])
+    lines = xarray.Dataset({"model_conductivity": (("model", "contrast", "density"), values)})
+    lines = lines.assign_coords(model=np.array(names, dtype=object), density=density)
+    if "contrast" not in comparison.dims:
+        return lines.isel(contrast=0)
+    return lines.assign_coords(contrast=comparison["contrast"].values)
 
 
 def _wanted(dataset: xarray.Dataset, models: Models | None) -> dict[str, Mapping[str, float]]:
     """Names and parameters asked for, checked."""
     if models is None:
-        models = study_of(dataset)["models"]["names"] or DEFAULT_MODELS
+        study = study_of(dataset)
+        models = study["models"]["names"] or (DEFAULT_MODELS if study.get("composite") is None else COMPOSITE_MODELS)
     wanted = dict(models) if isinstance(models, Mapping) else {name: {} for name in models}
     for name, parameters in wanted.items():
         known = {item.name for item in find_model(name).inputs} - {"k1", "k2", "fraction"}
@@ -232,29 +260,44 @@ def _add_differences(result: xarray.Dataset) -> None:
     result["rms_relative_difference"] = np.sqrt(square.sum("density", skipna=False) / points.where(points > 0))
 
 
-def _add_bounds(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases) -> None:
+def _add_bounds(result: xarray.Dataset, dataset: xarray.Dataset, media: Sequence[Phases]) -> None:
     k, model = result["conductivity_mean"], result["model_conductivity"]
-    kind = result["model_kind"]
-    above = (kind == "upper bound") & (k > model * (1.0 + ROUNDING))
-    below = (kind == "lower bound") & (k < model * (1.0 - ROUNDING))
+    kind, binding = result["model_kind"], media[0].overlapping
+    slack = ROUNDING + _doubt(result, dataset, media[0])
+    above = (kind == "upper bound") & (k > model * (1.0 + slack))
+    below = (kind == "lower bound") & (k < model * (1.0 - slack))
     result["outside_bound"] = (above | below).transpose(*model.dims)
     universal = result["model"].isin(BINDING)
     outside = (result["outside_bound"] & universal).any("model")
-    result["realizations_outside_bounds"] = _outside_wiener(dataset, medium)
+    result["realizations_outside_bounds"] = _outside_wiener(result, dataset, media)
     result["inside_bounds"] = ~outside & (result["realizations_outside_bounds"] == 0)
-    result["bound_broken"] = result["outside_bound"] & universal & medium.overlapping
-    broken = medium.overlapping and not bool(result["inside_bounds"].all())
-    result.attrs |= {"bounds_bind": int(medium.overlapping), "bound_broken": int(broken)}
+    result["bound_broken"] = result["outside_bound"] & universal & binding
+    broken = binding and not bool(result["inside_bounds"].all())
+    result.attrs |= {"bounds_bind": int(binding), "bound_broken": int(broken)}
 
 
-def _outside_wiener(dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray:
+def _doubt(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray | float:
+    """Relative doubt about the mean of a composite: its interval, and the error that its discretization leaves.
+
+    Dilute composites lie on a bound, where the scatter of a few realizations passes it.
+    """
+    if not medium.composite:
+        return 0.0
+    discretization = dataset["relative_energy_error"].mean("realization")
+    return (result["half_width"] / result["conductivity_mean"]).fillna(0.0) + discretization.fillna(0.0)
+
+
+def _outside_wiener(result: xarray.Dataset, dataset: xarray.Dataset, media: Sequence[Phases]) -> xarray.DataArray:
     """Number of realizations with a direction beyond the Wiener bounds of their own solid fraction."""
-    fraction = dataset["solid_fraction"]
+    fraction, pores = dataset["solid_fraction"], media[0].pores
     known = fraction.fillna(0.0)
-    upper = parallel(medium.pores, medium.particles, known) * (1.0 + ROUNDING)
-    lower = series(medium.pores, medium.particles, known) * (1.0 - ROUNDING)
+    slack: xarray.DataArray | float = ROUNDING
+    if media[0].composite:
+        slack = ROUNDING + dataset["relative_energy_error"].fillna(0.0)
+    upper = _by_contrast([parallel(pores, one.particles, known) for one in media], result) * (1.0 + slack)
+    lower = _by_contrast([series(pores, one.particles, known) for one in media], result) * (1.0 - slack)
     outside = fraction.isnull() & False
-    for i in range(medium.dimension):
+    for i in range(media[0].dimension):
         k = dataset["conductivity"].isel(direction_i=i, direction_j=i, drop=True)
         outside = outside | (k > upper) | (k < lower)
     dims = [dim for dim in half_trace(dataset["conductivity"]).dims if dim != "realization"]

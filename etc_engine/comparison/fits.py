@@ -39,7 +39,7 @@ class Fit:
     ----------
     model : str
     selection : dict
-        ``contact_angle`` and ``method`` of the points, where the sweep has them.
+        ``contact_angle`` or ``contrast``, and ``method`` of the points, where the sweep has them.
     points : int
         Number of densities that entered.
     parameters : tuple of Parameter
@@ -98,7 +98,7 @@ def fit_models(dataset: xarray.Dataset) -> tuple[Fit, ...]:
     Returns
     -------
     tuple of Fit
-        One for every model, contact angle and method.
+        One for every model, contact angle or contrast, and method.
 
     Notes
     -----
@@ -109,13 +109,16 @@ def fit_models(dataset: xarray.Dataset) -> tuple[Fit, ...]:
 
     Lewis-Nielsen and Agari-Uno describe a conducting matrix, so the study has to give the pores a conductivity.
     """
-    medium, simulation = phases(dataset), simulated(dataset)
+    media, simulation = phases(dataset), simulated(dataset)
     confidence = float(dataset.attrs.get("confidence_level", 0.95))
     swept = [dim for dim in simulation["conductivity_mean"].dims if dim != "density"]
     fits = []
     for values in itertools.product(*(simulation[dim].values.tolist() for dim in swept)):
         selection = dict(zip(map(str, swept), values, strict=True))
         cell = simulation.sel(selection)
+        medium = (
+            media[simulation["contrast"].values.tolist().index(selection["contrast"])] if len(media) > 1 else media[0]
+        )
         fraction, k = cell["solid_fraction"].values, cell["conductivity_mean"].values
         used = np.isfinite(fraction) & (np.nan_to_num(k) > 0.0)
         error = cell["conductivity_sem"].values[used] / k[used]
@@ -129,7 +132,10 @@ def _fit_all(points: _Points, medium: Phases, selection: dict[str, Any], confide
     f = points.f
     if f.size < 3 or np.ptp(f) <= 0.0:
         return [Fit("percolation_power_law", selection, f.size, note="needs conductivities at 4 densities or more")]
-    fits = [_fit(_percolation(f, points.k), points, selection, confidence)]
+    if medium.composite:
+        fits = [Fit("percolation_power_law", selection, f.size, note="needs pores that insulate")]
+    else:
+        fits = [_fit(_percolation(f, points.k), points, selection, confidence)]
     if medium.pores <= 0.0:
         note = "needs pores that conduct"
         return [

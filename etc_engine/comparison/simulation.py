@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray
 
 TENSOR = ("direction_i", "direction_j")
-SWEPT = ("density", "contact_angle", "method")
-"""The dimensions a sweep can have; a result has those its study varies, and always ``density``."""
 
 
 @dataclass(frozen=True)
@@ -27,18 +25,21 @@ class Phases:
     Parameters
     ----------
     pores, particles : float [W/(m K)]
-        Conductivity of phase 1 and of phase 2.
+        Conductivity of phase 1 (pores or matrix) and of phase 2.
     dimension : int
         2 for disks, 3 for spheres.
     overlapping : bool
-        True if the contacts are the overlaps of the particles: then the simulated body is their union, whose
-        solid fraction is known, and the bounds bind it. A bonded contact is wider than its geometry.
+        True if the simulated body is the union of the particles, whose solid fraction is known: then the bounds bind
+        it. A bonded contact is wider than its geometry.
+    composite : bool
+        True if the pores are a matrix that conducts in the simulation too.
     """
 
     pores: float
     particles: float
     dimension: int
     overlapping: bool
+    composite: bool = False
 
 
 def study_of(dataset: xarray.Dataset) -> dict[str, Any]:
@@ -61,8 +62,8 @@ def study_of(dataset: xarray.Dataset) -> dict[str, Any]:
     return study
 
 
-def phases(dataset: xarray.Dataset) -> Phases:
-    """The phases of the medium a sweep simulates, from the study stored with it.
+def phases(dataset: xarray.Dataset) -> tuple[Phases, ...]:
+    """The phases of the medium a sweep simulates, from the study stored with it: one, or one a contrast.
 
     Raises
     ------
@@ -77,12 +78,14 @@ def phases(dataset: xarray.Dataset) -> Phases:
             f"models of two phases need particles of one material, this study mixes {conduction['conductivity']:g} and "
             f"{mixture['conductivity']:g} W/(m K): compare it as studies/mixture does"
         )
-    return Phases(
-        pores=float(study["models"]["pore_conductivity"]),
-        particles=float(conduction["conductivity"]),
-        dimension=dataset.sizes["direction_i"],
-        overlapping=study["contacts"]["rule"] == "overlap",
-    )
+    dimension = dataset.sizes["direction_i"]
+    composite = study.get("composite")
+    if composite is None:
+        pores, overlapping = float(study["models"]["pore_conductivity"]), study["contacts"]["rule"] == "overlap"
+        return (Phases(pores, float(conduction["conductivity"]), dimension, overlapping),)
+    matrix = float(composite["matrix_conductivity"])
+    contrasts = composite["contrast"] or [float(conduction["conductivity"]) / matrix]
+    return tuple(Phases(matrix, contrast * matrix, dimension, True, True) for contrast in contrasts)
 
 
 def half_trace(tensor: xarray.DataArray) -> xarray.DataArray:

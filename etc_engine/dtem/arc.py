@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.dtem.element import Elements, Material, condense, packed_starts, refuse_indefinite
+from etc_engine.dtem.element import Elements, Material, Resistances, condense, packed_starts, refuse_indefinite
 from etc_engine.dtem.sides import ContactSides
 
 MODES = 5
@@ -66,6 +66,32 @@ def arc_elements(sides: ContactSides, material: Material, modes: int = MODES) ->
     refuse_indefinite(bad, sides)
     nodes = (modes * sides.nodes[:, None] + np.arange(modes)).ravel()
     return Elements(modes, offsets, nodes, starts, values)
+
+
+def arc_resistances(sides: ContactSides, material: Material, modes: int = MODES) -> Resistances:
+    """Resistance matrices H of all disks over (contact, mode); arguments as in `arc_elements`."""
+    points, weights = _quadrature(modes)
+    offsets = modes * sides.offsets
+    starts = packed_starts(offsets)
+    values = np.zeros(int(starts[-1]))
+    _fill_resistances(
+        sides.offsets,
+        sides.theta,
+        sides.alpha,
+        sides.mode_signs,
+        material.side_resistances(sides),
+        material.conductivity,
+        modes,
+        starts,
+        values,
+        int(np.diff(offsets).max(initial=1)),
+        points,
+        weights,
+    )
+    around = sides.theta[:, None] + sides.alpha[:, None] * points
+    signs = np.where(np.arange(modes) % 2 == 1, sides.mode_signs[:, None], 1.0)
+    moments = np.stack([signs * (np.cos(around) @ weights.T), signs * (np.sin(around) @ weights.T)], axis=-1)
+    return Resistances(modes, starts, values, moments.reshape(-1, 2))
 
 
 def arc_potentials(sides: ContactSides, material: Material, flows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -141,6 +167,67 @@ def _own_block(
 
 
 @njit(cache=True)
+def _disk_resistances(
+    first: int,
+    n: int,
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    signs: NDArray[np.float64],
+    resistance: NDArray[np.float64],
+    conductivity: float,
+    modes: int,
+    points: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    kernel: NDArray[np.float64],
+    block: NDArray[np.float64],
+    h: NDArray[np.float64],
+) -> None:
+    """H of the disk with sides ``first`` to ``first + n`` into ``h``; ``kernel`` and ``block`` are work space."""
+    for i in range(n):
+        for j in range(i + 1):
+            a, b = first + i, first + j
+            if i == j:
+                _own_block(alpha[a], points, weights, kernel, block)
+            else:
+                _block(theta[a] - theta[b], alpha[a], alpha[b], points, weights, kernel, block)
+            for k in range(modes):
+                for l in range(modes):
+                    sign = (signs[a] if k % 2 else 1.0) * (signs[b] if l % 2 else 1.0)
+                    h[i * modes + k, j * modes + l] = sign * block[k, l] / conductivity
+                    h[j * modes + l, i * modes + k] = h[i * modes + k, j * modes + l]
+        h[i * modes, i * modes] += resistance[first + i]
+
+
+@njit(cache=True)
+def _fill_resistances(
+    offsets: NDArray[np.int64],
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    signs: NDArray[np.float64],
+    resistance: NDArray[np.float64],
+    conductivity: NDArray[np.float64],
+    modes: int,
+    starts: NDArray[np.int64],
+    values: NDArray[np.float64],
+    widest: int,
+    points: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> None:
+    """Fill the packed matrices H."""
+    h = np.empty((widest, widest))
+    kernel = np.empty((points.size, points.size))
+    block = np.empty((modes, modes))
+    for p in range(offsets.size - 1):
+        first, n = offsets[p], offsets[p + 1] - offsets[p]
+        _disk_resistances(
+            first, n, theta, alpha, signs, resistance, conductivity[p], modes, points, weights, kernel, block, h
+        )
+        for i in range(n * modes):
+            for j in range(n * modes):
+                values[starts[p] + i * n * modes + j] = h[i, j]
+
+
+@njit(cache=True)
 def _fill(
     offsets: NDArray[np.int64],
     theta: NDArray[np.float64],
@@ -163,19 +250,9 @@ def _fill(
         first, n = offsets[p], offsets[p + 1] - offsets[p]
         if n < 2:
             continue
-        for i in range(n):
-            for j in range(i + 1):
-                a, b = first + i, first + j
-                if i == j:
-                    _own_block(alpha[a], points, weights, kernel, block)
-                else:
-                    _block(theta[a] - theta[b], alpha[a], alpha[b], points, weights, kernel, block)
-                for k in range(modes):
-                    for l in range(modes):
-                        sign = (signs[a] if k % 2 else 1.0) * (signs[b] if l % 2 else 1.0)
-                        h[i * modes + k, j * modes + l] = sign * block[k, l] / conductivity[p]
-                        h[j * modes + l, i * modes + k] = h[i * modes + k, j * modes + l]
-            h[i * modes, i * modes] += resistance[first + i]
+        _disk_resistances(
+            first, n, theta, alpha, signs, resistance, conductivity[p], modes, points, weights, kernel, block, h
+        )
         if not condense(h, n * modes, modes, work, values[starts[p] : starts[p + 1]]):
             return p
     return -1

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.dtem.element import Elements, Material, condense, packed_starts, refuse_indefinite
+from etc_engine.dtem.element import Elements, Material, Resistances, condense, packed_starts, refuse_indefinite
 from etc_engine.dtem.resistance import mutual_resistance_scalar, self_resistance
 from etc_engine.dtem.sides import ContactSides
 
@@ -54,6 +54,24 @@ def closed_form_elements(sides: ContactSides, material: Material, modes: int = 1
     return Elements(modes, sides.offsets, sides.nodes, starts, values)
 
 
+def closed_form_resistances(sides: ContactSides, material: Material, modes: int = 1, *, method: str) -> Resistances:
+    """Resistance matrices H of all disks; arguments as in `closed_form_elements`."""
+    starts = packed_starts(sides.offsets)
+    values = np.zeros(int(starts[-1]))
+    _fill_resistances(
+        sides.offsets,
+        sides.theta,
+        sides.alpha,
+        _diagonal(sides, material, method),
+        material.conductivity,
+        starts,
+        values,
+        int(np.diff(sides.offsets).max(initial=1)),
+    )
+    directions = np.stack([np.cos(sides.theta), np.sin(sides.theta)], axis=1)
+    return Resistances(modes, starts, values, np.sinc(sides.alpha / np.pi)[:, None] * directions)
+
+
 def closed_form_potentials(
     sides: ContactSides, material: Material, flows: NDArray[np.float64], method: str
 ) -> NDArray[np.float64]:
@@ -79,6 +97,47 @@ def _diagonal(sides: ContactSides, material: Material, method: str) -> NDArray[n
 
 
 @njit(cache=True)
+def _disk_resistances(
+    first: int,
+    n: int,
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    diagonal: NDArray[np.float64],
+    conductivity: float,
+    h: NDArray[np.float64],
+) -> None:
+    """H of the disk with sides ``first`` to ``first + n`` into ``h[:n, :n]``."""
+    for i in range(n):
+        a = first + i
+        h[i, i] = diagonal[a]
+        for j in range(i):
+            b = first + j
+            h[i, j] = mutual_resistance_scalar(theta[a] - theta[b], alpha[a], alpha[b]) / conductivity
+            h[j, i] = h[i, j]
+
+
+@njit(cache=True)
+def _fill_resistances(
+    offsets: NDArray[np.int64],
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    diagonal: NDArray[np.float64],
+    conductivity: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    values: NDArray[np.float64],
+    widest: int,
+) -> None:
+    """Fill the packed matrices H."""
+    h = np.empty((widest, widest))
+    for p in range(offsets.size - 1):
+        n = offsets[p + 1] - offsets[p]
+        _disk_resistances(offsets[p], n, theta, alpha, diagonal, conductivity[p], h)
+        for i in range(n):
+            for j in range(n):
+                values[starts[p] + i * n + j] = h[i, j]
+
+
+@njit(cache=True)
 def _fill(
     offsets: NDArray[np.int64],
     theta: NDArray[np.float64],
@@ -96,13 +155,7 @@ def _fill(
         first, n = offsets[p], offsets[p + 1] - offsets[p]
         if n < 2:
             continue
-        for i in range(n):
-            a = first + i
-            h[i, i] = diagonal[a]
-            for j in range(i):
-                b = first + j
-                h[i, j] = mutual_resistance_scalar(theta[a] - theta[b], alpha[a], alpha[b]) / conductivity[p]
-                h[j, i] = h[i, j]
+        _disk_resistances(first, n, theta, alpha, diagonal, conductivity[p], h)
         if not condense(h, n, 1, work, values[starts[p] : starts[p + 1]]):
             return p
     return -1

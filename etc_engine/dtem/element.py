@@ -77,6 +77,29 @@ class Elements:
         return _apply(self.offsets, self.starts, self.values, np.ascontiguousarray(temperatures))
 
 
+@dataclass(frozen=True, eq=False)
+class Resistances:
+    """Resistance matrices H of all disks, packed as `Elements` are, and how their rows see a field of one dipole.
+
+    Parameters
+    ----------
+    modes : int
+        Modes of every contact, M.
+    starts : ndarray of int, shape (n + 1,)
+        H of particle p is ``values[starts[p]:starts[p + 1]]``, row by row.
+    values : ndarray [m K/W]
+        Contact resistances included.
+    moments : ndarray, shape (rows, 2)
+        Of cos(angle) and sin(angle) over each row's flux mode; over an arc of uniform flux the first is
+        cos(theta) sin(alpha)/alpha.
+    """
+
+    modes: int
+    starts: NDArray[np.int64]
+    values: NDArray[np.float64]
+    moments: NDArray[np.float64]
+
+
 def packed_starts(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
     """Where each square matrix begins in a packed array, for elements of ``offsets[p + 1] - offsets[p]`` rows."""
     return np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
@@ -136,7 +159,7 @@ def _largest_ratio(
             row = i + (i >= ground)
             for j in range(i + 1):
                 inverse[i, j] = lower[starts[p] + row * size + j + (j >= ground)]
-        if not _cholesky_inverse(inverse, m):
+        if not cholesky_inverse(inverse, m):
             return np.inf
         trace = 0.0
         for i in range(m):
@@ -186,7 +209,7 @@ def condense(
             work[m, n] = value
             n += 1
         m += 1
-    if not _cholesky_inverse(work, m):
+    if not cholesky_inverse(work, m):
         return False
     out[:] = 0.0
     row = 0
@@ -211,7 +234,7 @@ def condense(
 
 
 @njit(cache=True)
-def _cholesky_inverse(a: NDArray[np.float64], m: int) -> bool:
+def cholesky_inverse(a: NDArray[np.float64], m: int) -> bool:
     """Invert ``a[:m, :m]`` in place, given its lower triangle; False if it is not positive definite."""
     for j in range(m):
         pivot = a[j, j]

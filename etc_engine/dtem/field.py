@@ -98,7 +98,7 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
         hung = network.wall_particles[driven]
         alone = number[hung] == 0
         temperatures[hung[alone]] = at_wall[driven[alone]]
-    _fill_dead_ends(temperatures, sides.offsets, sides.nodes, network.pairs, jumps, potentials)
+    fill_dead_ends(temperatures, sides.offsets, sides.nodes, network.pairs, jumps, potentials)
 
     open_walls = np.flatnonzero(np.isnan(at_wall))
     at_wall[open_walls] = temperatures[network.wall_particles[open_walls]] + potentials[sides.of_walls[open_walls]]
@@ -117,7 +117,7 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
 
 
 @njit(cache=True)
-def _fill_dead_ends(
+def fill_dead_ends(
     temperatures: NDArray[np.float64],
     offsets: NDArray[np.int64],
     nodes: NDArray[np.int64],

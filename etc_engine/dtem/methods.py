@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.dtem import arc, exact
-from etc_engine.dtem.arc import arc_elements, arc_potentials
-from etc_engine.dtem.closed_form import closed_form_elements, closed_form_potentials
-from etc_engine.dtem.element import Elements, Material
+from etc_engine.dtem.arc import arc_elements, arc_potentials, arc_resistances
+from etc_engine.dtem.closed_form import closed_form_elements, closed_form_potentials, closed_form_resistances
+from etc_engine.dtem.element import Elements, Material, Resistances
 from etc_engine.dtem.exact import exact_elements, exact_potentials
 from etc_engine.dtem.resistance import SELF_RESISTANCE
 from etc_engine.dtem.sides import ContactSides
@@ -35,6 +35,8 @@ class Method:
         Whether the flux is uniform over an arc; otherwise it follows Chebyshev modes over sqrt(1 - s^2).
     exact_cuts : bool
         Whether the disks lose what contacts and walls cut off: insulated walls and dead ends count then.
+    resistances : callable, optional
+        (sides, material, modes) -> Resistances, which a transient needs; None where the method has no such form.
     """
 
     elements: Callable[[ContactSides, Material, int], Elements]
@@ -42,6 +44,7 @@ class Method:
     modes: int
     uniform_flux: bool
     exact_cuts: bool = False
+    resistances: Callable[[ContactSides, Material, int], Resistances] | None = None
 
 
 MOST_MODES = 10
@@ -54,10 +57,11 @@ METHODS: Mapping[str, Method] = {
             partial(closed_form_potentials, method=name),
             modes=1,
             uniform_flux=name != "chord",
+            resistances=partial(closed_form_resistances, method=name),
         )
         for name in SELF_RESISTANCE
     },
-    "arc": Method(arc_elements, arc_potentials, arc.MODES, uniform_flux=False),
+    "arc": Method(arc_elements, arc_potentials, arc.MODES, uniform_flux=False, resistances=arc_resistances),
     "exact": Method(exact_elements, exact_potentials, exact.MODES, uniform_flux=False, exact_cuts=True),
 }
 

@@ -165,7 +165,7 @@ def driven_walls(network: ContactNetwork, axes: tuple[int, ...]) -> NDArray[np.b
 def make_material(network: ContactNetwork, conductivity: ArrayLike, contact_resistance: ArrayLike) -> Material:
     """The material of a network, arguments as in `solve_steady`."""
     return Material(
-        _positive(conductivity, network.packing.count, "conductivity", zero=False),
+        per_particle(conductivity, network.packing.count, "conductivity"),
         _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True),
     )
 
@@ -211,6 +211,11 @@ def _solve(system: LinearSystem, modes: int, tolerance: float) -> tuple[NDArray[
         )
         reports.append(report)
     return u, tuple(reports)
+
+
+def per_particle(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
+    """A positive value of each particle, from one number or an array."""
+    return _positive(values, count, name, zero=False)
 
 
 def _positive(values: ArrayLike, size: int, name: str, *, zero: bool) -> NDArray[np.float64]:

@@ -23,6 +23,12 @@ MEAN_FIELD = "contact_mean_field"
 DECADES = 1.3
 """A logarithmic axis is used when the simulated values span more than this many decades."""
 
+VARIANTS = {
+    "contact_angle": "contact half-angle [degree]",
+    "contrast": "conductivity of the particles over that of the matrix [-]",
+}
+"""Labels of the second axis of a sweep."""
+
 BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones"
 
 SHORT = {
@@ -81,7 +87,7 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
         style(axes)
         if logarithmic:
             axes.set_yscale("log")
-        if axis.dim == "contact_angle" and _is_wide(part[axis.dim].values):
+        if axis.dim in VARIANTS and _is_wide(part[axis.dim].values):
             axes.set_xscale("log")
         _draw_simulation(axes, part, axis)
         _draw_models(axes, part, lines, axis)
@@ -105,9 +111,13 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
 
 
 def _axis(comparison: xarray.Dataset) -> _Axis:
-    angles = comparison.sizes.get("contact_angle", 1)
-    if comparison.sizes["density"] == 1 and angles > 1:
-        return _Axis("contact_angle", "contact half-angle [degree]", "method" if "method" in comparison.dims else None)
+    """The density, or with one density the angle or contrast. Each contrast has a panel, because its models differ."""
+    methods = "method" if "method" in comparison.dims else None
+    for variant, label in VARIANTS.items():
+        if comparison.sizes["density"] == 1 and comparison.sizes.get(variant, 1) > 1:
+            return _Axis(variant, label, methods)
+    if comparison.attrs["composite"]:
+        return _Axis("density", "volume fraction of the particles [-]", methods)
     return _Axis(
         "density",
         "density (particle area over box area) [-]",
@@ -117,11 +127,17 @@ def _axis(comparison: xarray.Dataset) -> _Axis:
 
 def _panels(comparison: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
     """A title and a part of the comparison for each panel; no dimension is left but the axis and the curves."""
-    if axis.dim == "contact_angle":
+    if axis.dim in VARIANTS:
         comparison = comparison.isel(density=0)
-    if "method" not in comparison.dims or axis.curves == "method":
+    dims = [dim for dim in ("contrast", "method") if dim in comparison.dims and dim not in (axis.dim, axis.curves)]
+    if not dims:
         return [("", comparison)]
-    return [(f"method {name}", comparison.sel({"method": name})) for name in comparison["method"].values]
+    (dim,) = dims
+    return [(f"{dim} {_word(value)}", comparison.sel({dim: value})) for value in comparison[dim].values]
+
+
+def _word(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def _is_wide(values: NDArray[np.float64]) -> bool:
@@ -166,6 +182,8 @@ def _lines(
 ) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
     """Name, abscissas and ordinates of every model line."""
     source = lines if axis.dim == "density" else part
+    if "contrast" in source.dims and axis.dim != "contrast":
+        source = source.sel(contrast=part["contrast"].item())
     x, values = source[axis.dim].values, source["model_conductivity"]
     values = values.isel({dim: 0 for dim in values.dims if dim not in ("model", axis.dim)})  # a formula of the density
     return [(name, x, np.broadcast_to(values.sel({"model": name}).values, x.shape)) for name in _drawn(part)]
@@ -232,13 +250,14 @@ def _notes(comparison: xarray.Dataset) -> str:
     counts = comparison["count"].values[comparison["count"].values > 0]
     few, many = (int(counts.min()), int(counts.max())) if counts.size else (0, 0)
     number = f"{many}" if few == many else f"{few} to {many}"
-    notes = [
-        f"Bands: {100 * level:g} % Student-t interval of the mean of $k_{{xx}}$ and $k_{{yy}}$, {number} realizations."
-    ]
+    diagonal = "$k_{xx}$ and $k_{yy}$" if comparison.attrs["dimension"] == 2 else "$k_{xx}$, $k_{yy}$ and $k_{zz}$"
+    mean = f"the mean of {diagonal}"
+    notes = [f"Bands: {100 * level:g} % Student-t interval of {mean}, {number} realizations."]
     zero = [
         SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
     ]
     if zero and comparison.attrs["pore_conductivity"] == 0.0:
         notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
-    notes.append(f"{BOUNDS_NOTE}.")
+    if not comparison.attrs["composite"]:
+        notes.append(f"{BOUNDS_NOTE}.")
     return "\n".join(notes)

@@ -9,18 +9,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from etc_engine.batch.dataset import SWEPT
 from etc_engine.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, style
 
 if TYPE_CHECKING:
     import xarray
 
-CELL = ("density", "contact_angle", "method")
 MOST_PANELS = 24
 
 
 def cells(values: xarray.DataArray) -> list[tuple[str, xarray.DataArray]]:
     """A short name and the values of every cell of a sweep, densities outermost."""
-    dims = [dim for dim in CELL if dim in values.dims]
+    dims = [dim for dim in SWEPT if dim in values.dims]
     found = []
     for index in itertools.product(*(range(values.sizes[dim]) for dim in dims)):
         picked: dict[Any, int] = dict(zip(dims, index, strict=True))
@@ -32,6 +32,8 @@ def cells(values: xarray.DataArray) -> list[tuple[str, xarray.DataArray]]:
 def _word(dim: str, value: Any) -> str:
     if dim == "density":
         return f"density {value:.4g}"
+    if dim == "contrast":
+        return f"contrast {value:g}"
     return f"{value:g}°" if dim == "contact_angle" else str(value)
 
 

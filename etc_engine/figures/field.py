@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from etc_engine.dtem.field import ParticleField
 from etc_engine.dtem.raster import sample_image
 from etc_engine.dtem.steady import SteadySolution
+from etc_engine.pipe.steady import PipeSolution
 
 DETAILED = 3_000
 """Above this many particles each is drawn in its mean temperature, and contact flows are left out."""
@@ -20,14 +21,17 @@ WIDEST = 0.3
 """Line width of the largest heat flow, in mean particle diameters."""
 
 
-def save_field(path: Path, solution: SteadySolution, field: ParticleField, caption: str = "", load: int = 0) -> None:
+def save_field(
+    path: Path, solution: SteadySolution | PipeSolution, field: ParticleField, caption: str = "", load: int = 0
+) -> None:
     """Picture of the particles coloured by their inner temperature, heat flows as line widths.
 
     Parameters
     ----------
     path : path
         Its ending decides the format.
-    solution : SteadySolution
+    solution : SteadySolution or PipeSolution
+        A pipe network is drawn in the mean temperatures of its particles.
     field : ParticleField
         Recovered from it.
     caption : str
@@ -46,24 +50,27 @@ def save_field(path: Path, solution: SteadySolution, field: ParticleField, capti
         low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     else:
         low, high = 0.0, 1.0
-    detailed = packing.count <= DETAILED
-    if detailed:
+    detailed, inside = packing.count <= DETAILED, not isinstance(solution, PipeSolution)
+    if detailed and not isinstance(solution, PipeSolution):
         image, _ = sample_image(solution, field, 900, load)
         mapped: ScalarMappable = axes.imshow(
             image, extent=(0, width, 0, height), origin="lower", cmap="inferno", vmin=low, vmax=high, zorder=2
         )
         _draw_disks(axes, packing.centers, packing.radii, facecolors="0.85", edgecolors="none", zorder=1)
         _draw_disks(axes, packing.centers, packing.radii, facecolors="none", edgecolors="0.3", linewidths=0.4, zorder=3)
-        diameter = 2.0 * float(packing.radii.mean()) * scale * 72.0  # [pt]
-        _draw_flows(axes, solution, field, min(WIDEST * diameter, 5.0))
     else:
-        disks = _draw_disks(axes, packing.centers, packing.radii, cmap="inferno", edgecolors="none")
+        edges = {"edgecolors": "0.3", "linewidths": 0.4} if detailed else {"edgecolors": "none"}
+        disks = _draw_disks(axes, packing.centers, packing.radii, cmap="inferno", zorder=2, **edges)
         disks.set_array(field.particle_temperatures)
         disks.set_clim(low, high)
         mapped = disks
+    if detailed:
+        diameter = 2.0 * float(packing.radii.mean()) * scale * 72.0  # [pt]
+        _draw_flows(axes, solution, field, min(WIDEST * diameter, 5.0))
     axes.set(xlim=(0, width), ylim=(0, height), aspect="equal", xlabel="x [m]", ylabel="y [m]")
     axes.set_title(caption, fontsize=10)
-    label = "temperature [K]" + (", heat flow by line width" if detailed else ", mean of each particle")
+    means = "" if detailed and inside else ", mean of each particle"
+    label = "temperature [K]" + means + (", heat flow by line width" if detailed else "")
     figure.colorbar(mapped, ax=axes, label=label, shrink=0.85)
     figure.savefig(path, dpi=150, bbox_inches="tight")
 
@@ -82,7 +89,7 @@ def _draw_disks(axes: Axes, centers: np.ndarray, radii: np.ndarray, **style: obj
     return disks
 
 
-def _draw_flows(axes: Axes, solution: SteadySolution, field: ParticleField, widest: float) -> None:
+def _draw_flows(axes: Axes, solution: SteadySolution | PipeSolution, field: ParticleField, widest: float) -> None:
     """Lines from centre to centre (or to the wall), as wide as the heat flow, the largest ``widest`` points."""
     network = solution.network
     centers = network.packing.centers

@@ -6,7 +6,7 @@ import io
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from etc_engine.box import AXES, Box
 from etc_engine.errors import InputError
 from etc_engine.packing.files import ParticleTable
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.packing.trajectory import Trajectory
 
 FLAT = 1e-9
 """Centres whose heights differ by less than this part of the largest radius lie in one plane."""
@@ -64,6 +65,54 @@ def count_frames(path: Path | str) -> int:
     return sum(1 for _ in _frames(Path(path)))
 
 
+def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
+    """All frames of a text dump: one set of particles that moves.
+
+    Parameters
+    ----------
+    path : path
+    timestep : float [s]
+        Time of one step of the code that wrote the dump; the frames' steps times it are their times.
+
+    Returns
+    -------
+    Trajectory
+        Its times start at 0; the conductivities are those of the first frame.
+
+    Raises
+    ------
+    InputError, GeometryError
+        As `read_dump`; also if the particles have no ``id``, or if they, the box or its walls are not the same in
+        every frame.
+
+    Notes
+    -----
+    A box that moves or deforms is refused: its walls would do work that no heat balance here knows of.
+    """
+    path = Path(path)
+    if not (np.isfinite(timestep) and timestep > 0.0):
+        raise InputError(f"the time step of a dump must be positive, found {timestep:g}")
+    steps, packings = [], []
+    conductivity: NDArray[np.float64] | None = None
+    ids: NDArray[np.int64] | None = None
+    for number, frame in enumerate(_frames(path)):
+        table = _particles(path, frame)
+        if table.ids is None:
+            raise InputError(f"{path}: frame {number} has no column id, by which particles are followed through frames")
+        if ids is not None and not np.array_equal(ids, table.ids):
+            odd = np.setxor1d(ids, table.ids)
+            what = f"particle {odd[0]} is not in both" if odd.size else "ids repeat"
+            raise InputError(f"{path}: frame {number} does not hold the particles of frame 0 ({what}): all must stay")
+        if ids is None:
+            conductivity = table.conductivity
+        ids = table.ids
+        steps.append(frame.timestep)
+        packings.append(table.packing)
+    assert ids is not None
+    times = timestep * (np.array(steps, dtype=np.float64) - steps[0])
+    return Trajectory(times, tuple(packings), ids, conductivity)
+
+
 def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> None:
     """Write particles as one frame of a LAMMPS text dump, with as many digits as read back the same numbers.
 
@@ -72,6 +121,34 @@ def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> Non
     InputError
         If spheres lie in one plane: a dump does not tell them from disks.
     """
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        _write_frame(file, table, timestep)
+
+
+def write_trajectory(path: Path | str, trajectory: Trajectory, timestep: float = 1.0) -> None:
+    """Write a trajectory as frames of a LAMMPS text dump, one a time; `read_trajectory` reads it back.
+
+    Parameters
+    ----------
+    path : path
+    trajectory : Trajectory
+    timestep : float [s]
+        Time of one step; every time of the trajectory is rounded to a whole number of them.
+
+    Raises
+    ------
+    InputError
+        If two frames come to lie on one step, or as `write_dump`.
+    """
+    steps = np.rint(trajectory.times / timestep).astype(np.int64)
+    if (np.diff(steps) <= 0).any():
+        raise InputError(f"a time step of {timestep:g} s puts two frames on one step: write with a smaller one")
+    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
+        for step, packing in zip(steps.tolist(), trajectory.packings, strict=True):
+            _write_frame(file, ParticleTable(packing, trajectory.conductivity, trajectory.ids), step)
+
+
+def _write_frame(file: TextIO, table: ParticleTable, timestep: int) -> None:
     packing = table.packing
     if packing.dimension == 3 and _is_flat(packing.centers[:, 2], packing.radii):
         raise InputError("spheres at one height would be read from a dump as disks: write .csv, .nc or .vtp instead")
@@ -87,13 +164,13 @@ def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> Non
     if table.conductivity is not None:
         columns.append(table.conductivity)
         names += " conductivity"
-    with Path(path).open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"ITEM: TIMESTEP\n{timestep}\nITEM: NUMBER OF ATOMS\n{packing.count}\n")
-        file.write(f"ITEM: BOX BOUNDS {' '.join(flags)}\n")
-        file.writelines(f"{low!r} {high!r}\n" for low, high in bounds)
-        file.write(f"ITEM: ATOMS {names}\n")
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        file.writelines(f"{number + 1} 1 {' '.join(map(repr, row))}\n" for number, row in enumerate(rows))
+    ids = np.arange(1, packing.count + 1) if table.ids is None else table.ids
+    file.write(f"ITEM: TIMESTEP\n{timestep}\nITEM: NUMBER OF ATOMS\n{packing.count}\n")
+    file.write(f"ITEM: BOX BOUNDS {' '.join(flags)}\n")
+    file.writelines(f"{low!r} {high!r}\n" for low, high in bounds)
+    file.write(f"ITEM: ATOMS {names}\n")
+    rows = zip(ids.tolist(), *(column.tolist() for column in columns), strict=True)
+    file.writelines(f"{number} 1 {' '.join(map(repr, row))}\n" for number, *row in rows)
 
 
 def _frames(path: Path) -> Iterator[_Frame]:
@@ -153,9 +230,11 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
     if values.shape[1] != len(frame.columns):
         raise InputError(f"{path}: {len(frame.columns)} columns are named, {values.shape[1]} found")
     columns = dict(zip(frame.columns, values.T, strict=True))
+    ids = None
     if "id" in columns:
         order = np.argsort(columns["id"], kind="stable")
         columns = {name: column[order] for name, column in columns.items()}
+        ids = columns["id"].astype(np.int64)
     radii = _radii(path, columns)
     positions = [
         _positions(path, columns, axis, bounds[axis]) for axis in range(3) if axis < 2 or "z" in _spelled(columns)
@@ -167,7 +246,7 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
         tuple(flag.startswith("p") for flag in (frame.box_header or ["ff"] * 3)[:dimension]),
     )
     centers = np.stack(positions[:dimension], axis=1) - bounds[:dimension, 0]
-    return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"))
+    return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"), ids)
 
 
 def _bounds(path: Path, frame: _Frame) -> NDArray[np.float64]:

@@ -24,10 +24,13 @@ class ParticleTable:
     packing : ParticlePacking
     conductivity : ndarray, shape (n,) [W/(m K)], or None
         Conductivity of each particle, where the file gives it.
+    ids : ndarray of int64, shape (n,), or None
+        Number by which the file names each particle, where it does.
     """
 
     packing: ParticlePacking
     conductivity: NDArray[np.float64] | None = None
+    ids: NDArray[np.int64] | None = None
 
 
 def read_csv(path: Path | str, box: Box) -> ParticleTable:

@@ -11,13 +11,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from etc_engine.batch.dataset import SWEPT
 from etc_engine.realization import Status
 
 if TYPE_CHECKING:
     import xarray
 
-CELL = ("density", "contact_angle", "method")
-HEADINGS = {"density": "density", "contact_angle": "contact half-angle [°]", "method": "method"}
+HEADINGS = {
+    "density": "density",
+    "contact_angle": "contact half-angle [°]",
+    "contrast": "contrast",
+    "method": "method",
+}
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1d2430; background: #fff;
@@ -99,7 +104,7 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     facts = {
         "packing": f"{study['packing']['method']}, {study['packing']['radii']}",
         "box [m]": f"{box}, {study['packing']['periodic'] or 'not'} periodic",
-        "contacts": study["contacts"]["rule"],
+        "contacts": study["contacts"]["rule"] if study.get("composite") is None else "none: a matrix",
         "engine and method": f"{study['conduction']['engine']}, {study['conduction']['method']}",
         "particles of a realization": _number(float(particles.mean()), ".0f"),
         "realizations of a cell": _range(dataset["count"].values.ravel().tolist()),
@@ -158,14 +163,17 @@ def _models(comparison: xarray.Dataset) -> str:
     notes = dict(zip(names, comparison["model_note"].values.tolist(), strict=True))
     shown = [n for n in names if not notes[n].startswith("is 0")]
     pores, particles = comparison.attrs["pore_conductivity"], comparison.attrs["particle_conductivity"]
+    composite = bool(comparison.attrs["composite"])
+    conduct = ", ".join(f"{value:g}" for value in ([particles] if isinstance(particles, float) else particles))
+    around, bound = ("Matrix", "composites") if composite else ("Pores", "overlapping particles")
     binding = (
-        "The bounds bind overlapping particles: an asterisk is a result that breaks one."
+        f"The bounds bind {bound}: an asterisk is a result that breaks one."
         if comparison.attrs["bounds_bind"]
         else "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones: they are a comparison here."
     )
     text = (
-        f"<p>Pores of {pores:g} W/(m K), particles of {particles:g} W/(m K), at the mean solid fraction. Each model: "
-        f"conductivity in W/(m K), and relative difference to the simulation. {binding}</p>"
+        f"<p>{around} of {pores:g} W/(m K), particles of {conduct} W/(m K), at the mean solid fraction. "
+        f"Each model: conductivity in W/(m K), and relative difference to the simulation. {binding}</p>"
     )
     head = [*_labels(comparison), "simulation", *(titles[name] for name in shown)]
     rows, broken = [], []
@@ -280,13 +288,13 @@ def _provenance(dataset: xarray.Dataset) -> str:
 
 def _cells(data: xarray.Dataset) -> list[dict[str, int]]:
     """Indices of every cell, densities outermost."""
-    dims = [dim for dim in CELL if dim in data["conductivity_mean"].dims]
+    dims = [dim for dim in SWEPT if dim in data["conductivity_mean"].dims]
     ranges = (range(data.sizes[dim]) for dim in dims)
     return [dict(zip(dims, index, strict=True)) for index in itertools.product(*ranges)]
 
 
 def _labels(data: xarray.Dataset) -> list[str]:
-    return [HEADINGS[dim] for dim in CELL if dim in data["conductivity_mean"].dims]
+    return [HEADINGS[dim] for dim in SWEPT if dim in data["conductivity_mean"].dims]
 
 
 def _values(data: xarray.Dataset, index: Mapping[str, int]) -> list[str]:

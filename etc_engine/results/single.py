@@ -9,6 +9,7 @@ import numpy as np
 
 from etc_engine.dtem.field import ParticleField
 from etc_engine.dtem.steady import SteadySolution
+from etc_engine.pipe.steady import PipeSolution
 
 if TYPE_CHECKING:
     import xarray
@@ -16,12 +17,14 @@ if TYPE_CHECKING:
 WALLS = ("x=0", "x=L", "y=0", "y=L")
 
 
-def solve_dataset(solution: SteadySolution, field: ParticleField, attributes: Mapping[str, Any]) -> xarray.Dataset:
+def solve_dataset(
+    solution: SteadySolution | PipeSolution, field: ParticleField, attributes: Mapping[str, Any]
+) -> xarray.Dataset:
     """Dataset of one load of a steady solution.
 
     Parameters
     ----------
-    solution : SteadySolution
+    solution : SteadySolution or PipeSolution
     field : ParticleField
         Recovered from it.
     attributes : mapping

@@ -12,14 +12,15 @@ from etc_engine.dtem.field import ParticleField
 from etc_engine.dtem.interior import temperatures_inside
 from etc_engine.dtem.steady import SteadySolution
 from etc_engine.errors import InputError, OutputError
+from etc_engine.pipe.steady import PipeSolution
 
 RINGS, SPOKES = 6, 36
 """A disk is drawn as this many rings of quadrilaterals, finer towards its boundary, around a fan."""
 DETAILED = 20_000
-"""Above this many particles each is one polygon of its mean temperature."""
+"""Above this many particles, and in a pipe network, each is one polygon of its mean temperature."""
 
 
-def write_vtp(path: Path, solution: SteadySolution, field: ParticleField) -> None:
+def write_vtp(path: Path, solution: SteadySolution | PipeSolution, field: ParticleField) -> None:
     """Write a ``.vtp`` file: polygons of the particles, lines of the contacts.
 
     Point data ``temperature``; cell data ``particle`` (-1 on lines), ``mean_temperature`` and ``heat_flow`` (0 on
@@ -51,8 +52,8 @@ def write_vtp(path: Path, solution: SteadySolution, field: ParticleField) -> Non
     places = vtkPoints()
     places.SetData(numpy_to_vtk(np.column_stack([ends, np.zeros(len(ends))]), deep=True))
     data.SetPoints(places)
-    data.SetLines(_cells([len(points) + np.arange(2 * len(flow)).reshape(-1, 2)]))
-    data.SetPolys(_cells(polygons))
+    data.SetLines(vtk_cells([len(points) + np.arange(2 * len(flow)).reshape(-1, 2)]))
+    data.SetPolys(vtk_cells(polygons))
     pad = np.full(2 * len(flow), np.nan)
     for name, values, place in (
         ("temperature", np.concatenate([temperature, pad]), data.GetPointData()),
@@ -70,7 +71,8 @@ def write_vtp(path: Path, solution: SteadySolution, field: ParticleField) -> Non
         raise OutputError(f"cannot write {path}")
 
 
-def _cells(groups: list[NDArray[np.int64]]) -> Any:
+def vtk_cells(groups: list[NDArray[np.int64]]) -> Any:
+    """Cells of VTK out of lists of point numbers, each list of one width."""
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonDataModel import vtkCellArray
 
@@ -84,13 +86,13 @@ def _cells(groups: list[NDArray[np.int64]]) -> Any:
 
 
 def _disks(
-    solution: SteadySolution, field: ParticleField
+    solution: SteadySolution | PipeSolution, field: ParticleField
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.int64]], NDArray[np.int64]]:
     """Points, their temperatures, polygons as lists of point numbers by width, and the particle of each polygon."""
     packing = solution.network.packing
     turn = 2.0 * np.pi * np.arange(SPOKES) / SPOKES
     rim = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    if packing.count > DETAILED:
+    if packing.count > DETAILED or isinstance(solution, PipeSolution):
         points = (packing.centers[:, None] + packing.radii[:, None, None] * rim).reshape(-1, 2)
         polygons = np.arange(len(points)).reshape(-1, SPOKES)
         return points, np.repeat(field.particle_temperatures, SPOKES), [polygons], np.arange(packing.count)
@@ -114,7 +116,9 @@ def _disks(
     return packing.centers[particle] + offsets, temperature, [triangles, quadrilaterals], owner
 
 
-def _contacts(solution: SteadySolution, field: ParticleField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _contacts(
+    solution: SteadySolution | PipeSolution, field: ParticleField
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ends of the line of each contact, centre to centre, shape (m, 2, 2), and its heat flow."""
     network = solution.network
     start = network.packing.centers[network.pairs[:, 0]]

@@ -16,8 +16,10 @@ from etc_engine.batch.scheduler import Solo
 from etc_engine.batch.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
 from etc_engine.batch.study import parse_study
 from etc_engine.batch.table import join, tabulate
+from etc_engine.box import Box
 from etc_engine.errors import OutputError
-from etc_engine.realization import Cell, Realization, Status
+from etc_engine.packing import PackingSpec, parse_radii
+from etc_engine.realization import Cell, ConductionSpec, ContactSpec, Realization, RealizationSpec, Status
 
 
 def record(realization: int, value: float = 0.3, message: str = "") -> Record:
@@ -75,8 +77,11 @@ def test_numpy_numbers_of_an_engine_become_plain():
 
 
 def test_an_exception_becomes_a_steady_one_line_message():
-    result = failed_realization(ValueError(f"bad\nthing {object()!r}"), 2, 3, 2)
-    assert len(result.cells) == 2
+    contacts = ContactSpec("bonded", (0.1, 0.2))
+    packing = PackingSpec("advancing-front", parse_radii("equal:0.05"), Box((1.0, 1.0)))
+    two_angles = RealizationSpec(packing, contacts, ConductionSpec(methods=("chord", "standard", "enhanced")))
+    result = failed_realization(ValueError(f"bad\nthing {object()!r}"), two_angles, 2)
+    assert [len(row) for row in result.cells] == [3, 3]
     assert {cell.status for row in result.cells for cell in row} == {Status.ERROR}
     assert result.cells[0][0].message == "ValueError: bad thing <object object at 0x...>"
 

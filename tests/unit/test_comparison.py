@@ -182,8 +182,8 @@ def test_refusals(made_sweep):
 
 
 def test_phases_come_from_the_study(made_sweep):
-    assert phases(made_sweep(CONDUCTING_PORES, noisy)) == Phases(0.2, 2.0, 2, True)
-    assert phases(made_sweep(BONDED, noisy)) == Phases(0.0, 2.0, 2, False)
+    assert phases(made_sweep(CONDUCTING_PORES, noisy)) == (Phases(0.2, 2.0, 2, True),)
+    assert phases(made_sweep(BONDED, noisy)) == (Phases(0.0, 2.0, 2, False),)
     values, note = model_curve("maxwell", Phases(0.2, 2.0, 2, True), np.array([0.3, np.nan]))
     assert values[0] == pytest.approx(evaluate("maxwell", k1=0.2, k2=2.0, fraction=0.3, dimension=2), rel=1e-14)
     assert np.isnan(values[1])

@@ -11,9 +11,10 @@ from etc_engine.dtem.field import recover_field
 from etc_engine.dtem.resistance import SELF_RESISTANCE, mutual_resistance, self_resistance
 from etc_engine.dtem.sides import contact_sides
 from etc_engine.dtem.steady import solve_steady
-from etc_engine.effective import effective_conductivity, load_groups, wall_heat_flows
+from etc_engine.effective import effective_conductivity, wall_heat_flows
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.percolation import load_groups
 
 
 def random_disks(seed: int, periodic: tuple[bool, bool] = (False, False), count: int = 60) -> ParticlePacking:

@@ -138,6 +138,21 @@ def test_bounds_of_method_exact_are_in_its_cells():
     spec = RealizationSpec(small, ContactSpec("bonded", (np.radians(5.0),)), ConductionSpec(methods=("chord", "exact")))
     chord, exact = run(spec).cells[0]
     assert chord.conductivity_bounds == ()
+    assert 0.0 < exact.model_error_estimate < 1e-4
+    missed = abs(chord.conductivity[0, 0] / exact.conductivity[0, 0] - 1.0)
+    assert missed < chord.model_error_estimate < 0.05
     for axis, (lower, upper) in enumerate(exact.conductivity_bounds):
         assert lower <= exact.conductivity[axis, axis] <= upper
         assert upper - lower < 1e-5 * upper
+
+
+def test_the_pipe_engine_conducts_through_the_same_contacts():
+    pipes = replace(SPEC, conduction=ConductionSpec(engine="pipe", methods=("chord", "uniform")))
+    elements, result = run(SPEC), run(pipes)
+    for ours, theirs in zip(result.cells, elements.cells, strict=True):
+        for cell, element in zip(ours, theirs, strict=True):
+            assert cell.status is Status.OK
+            assert (cell.contacts, cell.coordination) == (element.contacts, element.coordination)
+            assert cell.conductivity[0, 0] == pytest.approx(element.conductivity[0, 0], rel=0.15)
+            assert cell.conductivity[0, 0] != pytest.approx(element.conductivity[0, 0], rel=1e-4)
+    assert result.cells[0][0].conductivity[0, 0] > result.cells[0][1].conductivity[0, 0]

@@ -1,0 +1,164 @@
+"""Composite: inclusions in a matrix, the geometry that the continuum engines start from, and their result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from etc_engine.errors import GeometryError, InputError
+from etc_engine.packing.neighbors import neighbor_pairs
+from etc_engine.packing.particles import ParticlePacking
+from etc_engine.packing.structure import solid_fraction
+
+MATRIX = -1
+"""What `Composite.phase` answers for a point in the matrix."""
+
+ROUNDING = 1e-9
+"""Overlaps below this, in mean radii, are contacts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Composite:
+    """Disks or spheres of given conductivities in a conducting matrix.
+
+    Parameters
+    ----------
+    inclusions : ParticlePacking
+        The inclusions. Periodic axes repeat them, walls cut off what reaches over.
+    matrix : float [W/(m K)]
+        Conductivity of the matrix, finite and not negative.
+    inclusion : float or array_like, shape (n,) [W/(m K)]
+        Of all inclusions, or of each; not negative, infinite for a perfect conductor.
+
+    Raises
+    ------
+    InputError
+        If a conductivity is not allowed or nothing conducts.
+    GeometryError
+        If the inclusions leave no matrix.
+
+    Notes
+    -----
+    Inclusions may overlap: their union counts once, and a point in several of them belongs to the one of the least
+    power distance :math:`|x - c|^2 - R^2`, so that the radical plane through the rim of the overlap divides them.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> sphere = ParticlePacking([[0.5, 0.5, 0.5]], [0.4], Box((1.0, 1.0, 1.0), (True, True, True)))
+    >>> composite = Composite(sphere, 0.2, 1.5)
+    >>> composite.conductivity_at([[0.5, 0.5, 0.2], [0.0, 0.0, 0.0]])
+    array([1.5, 0.2])
+    >>> round(composite.volume_fraction, 6)
+    0.268083
+    """
+
+    inclusions: ParticlePacking
+    matrix: float
+    inclusion: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        values, matrix = np.array(self.inclusion, dtype=np.float64), float(self.matrix)
+        if values.ndim and values.shape != (self.inclusions.count,):
+            raise InputError(
+                f"the conductivity of the inclusions must be one number or an array of shape "
+                f"({self.inclusions.count},), found shape {values.shape}"
+            )
+        bad = ~(values >= 0.0)
+        if bad.any():
+            raise InputError(
+                f"the conductivity of an inclusion must not be negative, found {values[bad].flat[0]:g}: "
+                "0 insulates, inf conducts perfectly"
+            )
+        if not (np.isfinite(matrix) and matrix >= 0.0):
+            raise InputError(f"the conductivity of the matrix must be finite and not negative, found {matrix:g}")
+        if matrix == 0.0 and not values.any():
+            raise InputError("neither the matrix nor an inclusion conducts: give at least one a conductivity above 0")
+        object.__setattr__(self, "inclusion", np.broadcast_to(values, (self.inclusions.count,)))
+        object.__setattr__(self, "matrix", matrix)
+        if self.volume_fraction >= 1.0 - 1e-12:
+            raise GeometryError("the inclusions fill the whole box and leave no matrix: use fewer or smaller ones")
+
+    @property
+    def dimension(self) -> int:
+        """2 for disks, 3 for spheres."""
+        return self.inclusions.dimension
+
+    @cached_property
+    def volume_fraction(self) -> float:
+        """Exact volume (area) of the union of the inclusions inside the box, over the box's."""
+        return solid_fraction(self.inclusions)
+
+    @property
+    def contrast(self) -> tuple[float, float]:
+        """Least and largest conductivity of an inclusion over that of the matrix."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = self.inclusion / self.matrix
+        return float(np.nanmin(ratios)), float(np.nanmax(ratios))
+
+    @property
+    def overlapping(self) -> int:
+        """Number of pairs of inclusions that overlap by more than rounding, periodic images included."""
+        gaps = neighbor_pairs(self.inclusions).gaps
+        return int((gaps < -ROUNDING * self.inclusions.radii.mean()).sum())
+
+    def phase(self, points: ArrayLike) -> NDArray[np.int64]:
+        """Row number of the inclusion that holds each point, `MATRIX` for none.
+
+        Parameters
+        ----------
+        points : array_like, shape (m, d) [m]
+            Inside the box, or anywhere along a periodic axis.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+        """
+        box = self.inclusions.box
+        points = box.wrap(np.asarray(points, dtype=np.float64))
+        # a cKDTree takes a length of 0 for an axis that does not repeat
+        tree = cKDTree(points, boxsize=np.where(box.periodic, box.lengths, 0.0))
+        owner = np.full(points.shape[0], MATRIX, dtype=np.int64)
+        least = np.full(points.shape[0], np.inf)
+        for row, (center, radius) in enumerate(zip(self.inclusions.centers, self.inclusions.radii, strict=True)):
+            inside = np.asarray(tree.query_ball_point(center, radius), dtype=np.int64)
+            power = (box.minimum_image(points[inside] - center) ** 2).sum(axis=1) - radius**2
+            closer = power < least[inside]
+            owner[inside[closer]], least[inside[closer]] = row, power[closer]
+        return owner
+
+    def conductivity_at(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Conductivity at each point, shape (m,) [W/(m K)]; points as in `phase`."""
+        return np.append(self.inclusion, self.matrix)[self.phase(points)]
+
+
+@dataclass(frozen=True, eq=False)
+class Homogenized:
+    """The effective conductivity of a composite.
+
+    Parameters
+    ----------
+    tensor : ndarray, shape (d, d) [W/(m K)]
+        With walls only the diagonal: along each axis between two isothermal walls, the others adiabatic.
+    volume_fraction : float
+        Of the inclusions, in the geometry that was solved.
+    unknowns : int
+        Nodes or voxels.
+    iterations : int
+        Most of a load.
+    relative_error_estimate : float
+        Of the conductivity; the engine says what it is made of.
+    seconds : float
+        Of the whole computation.
+    """
+
+    tensor: NDArray[np.float64]
+    volume_fraction: float
+    unknowns: int
+    iterations: int
+    relative_error_estimate: float
+    seconds: float

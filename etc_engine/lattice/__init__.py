@@ -1,0 +1,1 @@
+"""Heat conduction through continuous 3D media by a lattice of particles."""

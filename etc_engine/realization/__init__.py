@@ -1,0 +1,30 @@
+"""One realization: pack, find contacts, conduct."""
+
+from etc_engine.realization.engines import ENGINES, Engine, realize
+from etc_engine.realization.networks import conduct_dtem
+from etc_engine.realization.outcome import Cell, Cells, Realization, Status
+from etc_engine.realization.specification import (
+    CompositeSpec,
+    ConductionSpec,
+    ContactSpec,
+    Mixture,
+    RealizationSpec,
+    particle_conductivities,
+)
+
+__all__ = [
+    "ENGINES",
+    "Cell",
+    "Cells",
+    "CompositeSpec",
+    "ConductionSpec",
+    "ContactSpec",
+    "Engine",
+    "Mixture",
+    "Realization",
+    "RealizationSpec",
+    "Status",
+    "conduct_dtem",
+    "particle_conductivities",
+    "realize",
+]

@@ -1,0 +1,70 @@
+"""What a realization leaves behind: a cell for every contact angle (or contrast) and method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.realization.specification import RealizationSpec
+
+
+class Status(IntEnum):
+    """How a cell of a sweep ended. 0 and 1 carry a conductivity; the others are NaN."""
+
+    OK = 0
+    NOT_PERCOLATING = 1
+    PACKING_FAILED = 2
+    NOT_CONVERGED = 3
+    ERROR = 4
+    NOT_RUN = 5
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The outcome for one contact angle (or contrast) and one method.
+
+    ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
+    ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``model_error_estimate`` is
+    what the method is estimated to miss, where it tells: ``chord`` solved in full, ``exact`` by its bounds.
+    ``solved_by`` is ``full``, or ``reduced`` where the conductivity comes from the solutions at other
+    contact angles, ``snapshots`` of them. ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each
+    axis, of method ``exact`` only.
+    """
+
+    status: Status
+    message: str = ""
+    conductivity: NDArray[np.float64] = field(default_factory=lambda: np.full((2, 2), np.nan))
+    contacts: int = 0
+    wall_contacts: int = 0
+    coordination: float = np.nan
+    unknowns: int = 0
+    iterations: int = 0
+    relative_energy_error: float = np.nan
+    solve_seconds: float = 0.0
+    mean_field_conductivity: float = np.nan
+    model_error_estimate: float = np.nan
+    solved_by: str = ""
+    snapshots: int = 0
+    conductivity_bounds: tuple[tuple[float, float], ...] = ()
+
+
+Cells = tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True)
+class Realization:
+    """What one realization gave; ``cells[variant][method]`` in the order of the specification."""
+
+    particles: int
+    density: float
+    solid_fraction: float
+    pack_seconds: float
+    cells: Cells
+
+
+def uniform_cells(spec: RealizationSpec, cell: Cell) -> Cells:
+    """The same outcome in every cell of a realization."""
+    return ((cell,) * len(spec.conduction.methods),) * spec.variants

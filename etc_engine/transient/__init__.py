@@ -1,0 +1,1 @@
+"""Transients on contact networks: study files, systems, runs and restarts, moving particles."""

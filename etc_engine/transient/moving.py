@@ -1,0 +1,259 @@
+r"""Heat in particles that move: a trajectory drives a changing contact network, temperatures are carried along.
+
+From the time of each frame to that of the next, the contacts are those of the frame. The heat capacity of a particle
+stays what it is, whatever its contacts cut off at a time: C_i = rho c V_i with the full disk of the first frame. So a
+contact that opens or closes changes no heat, and
+
+    sum_i C_i (T_i - T_i(0)) = heat through the walls + heat from the sources
+
+holds to round-off over any number of frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from etc_engine.contacts import ContactNetwork
+from etc_engine.errors import InputError
+from etc_engine.packing.particles import ParticlePacking
+from etc_engine.packing.trajectory import Trajectory
+from etc_engine.solvers.marching import march
+from etc_engine.transient.systems import ParticleSystem
+
+Build = Callable[[ContactNetwork, NDArray[np.float64]], ParticleSystem]
+"""(network, heat capacity of each particle [J/(m K)]) -> system; walls, materials and sources are the builder's.
+
+The functions that make systems take rho c and multiply with the area that a method stores heat in, so a builder hands
+them ``capacities / stored_areas(network, method)``.
+"""
+
+
+@dataclass(frozen=True)
+class ThermalExpansion:
+    """Radii that follow the temperatures, R = R_frame (1 + a (T - T_ref)).
+
+    Parameters
+    ----------
+    coefficient : float [1/K]
+        Linear expansion a.
+    reference : float [K]
+        Temperature at which the radii are those of the trajectory.
+    """
+
+    coefficient: float
+    reference: float = 0.0
+
+    def apply(self, packing: ParticlePacking, temperatures: NDArray[np.float64]) -> ParticlePacking:
+        """The packing at these temperatures.
+
+        Raises
+        ------
+        InputError
+            If a radius would not be positive.
+        """
+        factors = 1.0 + self.coefficient * (temperatures - self.reference)
+        if not (factors > 0.0).all():
+            first = int(np.argmin(factors))
+            raise InputError(
+                f"an expansion of {self.coefficient:g} per kelvin leaves particle {first} no radius at "
+                f"{temperatures[first]:g} K: take a smaller coefficient"
+            )
+        return packing.with_radii(packing.radii * factors)
+
+
+@dataclass(frozen=True, eq=False)
+class MovingState:
+    """The particles at the time of a frame.
+
+    Parameters
+    ----------
+    frame : int
+    time : float [s]
+    temperatures : ndarray, shape (n,) [K]
+        Mean temperature of each particle.
+    radii : ndarray, shape (n,) [m]
+        Of the contacts from here on, thermal expansion included.
+    rates : ndarray, shape (k,) [W/m]
+        Heat flows of the system (walls, sources), with the contacts up to here.
+    heat : ndarray, shape (k,) [J/m]
+        The same integrated since the first frame.
+    stored : float [J/m]
+        sum_i C_i (T_i - T_i(0)); equal to the sum of ``heat``.
+    contacts, opened, closed : int
+        Contacts between particles from here on; how many of the frame before are gone, and how many are new.
+    steps, iterations : int
+        Since the first frame.
+    """
+
+    frame: int
+    time: float
+    temperatures: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    rates: NDArray[np.float64]
+    heat: NDArray[np.float64]
+    stored: float
+    contacts: int
+    opened: int
+    closed: int
+    steps: int
+    iterations: int
+
+    @property
+    def imbalance(self) -> float:
+        """Heat stored less heat that came in [J/m]."""
+        return self.stored - float(self.heat.sum())
+
+
+def march_trajectory(
+    trajectory: Trajectory,
+    contacts: Callable[[ParticlePacking], ContactNetwork],
+    build: Build,
+    initial: ArrayLike,
+    *,
+    heat_capacity: ArrayLike = 1.0,
+    expansion: ThermalExpansion | None = None,
+    scheme: str = "bdf2",
+    steps: int = 4,
+    tolerance: float = 1e-3,
+    solver_tolerance: float = 1e-10,
+    restart: MovingState | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[MovingState]:
+    """Temperatures of moving particles at the time of every frame.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Two-dimensional.
+    contacts : callable
+        packing -> contact network, such as `etc_engine.contacts.overlap_contacts`.
+    build : callable
+        (network, capacities) -> system of that network.
+    initial : float or array_like, shape (n,) [K]
+        Temperatures at the first frame.
+    heat_capacity : float or array_like, shape (n,) [J/(m3 K)]
+        rho c of all particles, or of each.
+    expansion : ThermalExpansion, optional
+    scheme : str
+        A name of `etc_engine.solvers.marching.SCHEMES`.
+    steps : int
+        Steps from frame to frame; ``adaptive`` finds its own.
+    tolerance, solver_tolerance : float
+        As in `etc_engine.solvers.marching.march`.
+    restart : MovingState, optional
+        A state of the same run, to go on from; the other arguments are still those of the start.
+    progress : callable, optional
+        Told the time after every step.
+
+    Yields
+    ------
+    MovingState
+        At every frame, the first included.
+
+    Raises
+    ------
+    InputError, GeometryError, ConvergenceError
+
+    Notes
+    -----
+    Only mean temperatures are carried from frame to frame: dipole states start from zero at each, for how a disk turns
+    is not known.
+
+    Examples
+    --------
+    Two disks of different temperature that part after the first interval:
+
+    >>> from etc_engine import Box
+    >>> from etc_engine.contacts import overlap_contacts
+    >>> from etc_engine.dtem.storage import stored_areas
+    >>> from etc_engine.pipe.transient import pipe_transient
+    >>> box = Box((4.0, 1.0))
+    >>> disks = [ParticlePacking([[1.0, 0.5], [x, 0.5]], [0.3, 0.3], box) for x in (1.55, 2.5, 2.5)]
+    >>> def pipes(network, capacities):
+    ...     return pipe_transient(network, {}, heat_capacity=capacities / stored_areas(network, "chord"))
+    >>> states = list(march_trajectory(Trajectory([0.0, 0.1, 9.0], disks), overlap_contacts, pipes, [1.0, 0.0]))
+    >>> [state.contacts for state in states], bool(states[1].temperatures[1] > 0.1)
+    ([1, 0, 0], True)
+    >>> bool((states[2].temperatures == states[1].temperatures).all())
+    True
+    """
+    first = trajectory.packings[0]
+    capacities = first.measures * _of_particles(heat_capacity, first.count, "heat capacity")
+    start = _of_particles(initial, first.count, "initial temperature")
+    packing, network = _contacts(first, expansion, start, contacts)
+    system = build(network, capacities)
+    rates = system.heat.rates(trajectory.times[0], system.initial(start))
+    none = np.zeros_like(rates)
+    state = MovingState(
+        0, float(trajectory.times[0]), start, packing.radii, rates, none, 0.0, network.count, 0, 0, 0, 0
+    )
+    if restart is None:
+        yield state
+    else:
+        state = restart
+        packing, network = _contacts(trajectory.packings[state.frame], expansion, state.temperatures, contacts)
+        system = build(network, capacities)
+    for frame, (low, high) in enumerate(pairwise(trajectory.times)):
+        if frame < state.frame:
+            continue
+        *_, ended = march(
+            system.heat,
+            system.initial(state.temperatures),
+            [low, high],
+            scheme=scheme,
+            steps=None if scheme == "adaptive" else steps,
+            tolerance=tolerance,
+            solver_tolerance=solver_tolerance,
+            progress=progress,
+        )
+        temperatures = system.particle_temperatures(ended.temperatures)
+        rates = system.heat.rates(high, ended.temperatures)
+        before = network
+        packing, network = _contacts(trajectory.packings[frame + 1], expansion, temperatures, contacts)
+        system = build(network, capacities)
+        opened, closed = _changes(before, network)
+        state = MovingState(
+            frame + 1,
+            float(high),
+            temperatures,
+            packing.radii,
+            rates,
+            state.heat + ended.heat,
+            float(capacities @ (temperatures - start)),
+            network.count,
+            opened,
+            closed,
+            state.steps + ended.steps,
+            state.iterations + ended.iterations,
+        )
+        yield state
+
+
+def _contacts(
+    packing: ParticlePacking,
+    expansion: ThermalExpansion | None,
+    temperatures: NDArray[np.float64],
+    contacts: Callable[[ParticlePacking], ContactNetwork],
+) -> tuple[ParticlePacking, ContactNetwork]:
+    packing = packing if expansion is None else expansion.apply(packing, temperatures)
+    return packing, contacts(packing)
+
+
+def _changes(before: ContactNetwork, after: ContactNetwork) -> tuple[int, int]:
+    """Pairs that are gone, and pairs that are new."""
+    n = before.packing.count
+    old, new = (np.unique(network.pairs[:, 0] * n + network.pairs[:, 1]) for network in (before, after))
+    return int(np.setdiff1d(old, new).size), int(np.setdiff1d(new, old).size)
+
+
+def _of_particles(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
+    """One value for all particles, or one for each."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (count,)) or not np.isfinite(array).all():
+        raise InputError(f"the {name} must be one finite number or {count} of them, found shape {array.shape}")
+    return np.broadcast_to(array, (count,)).copy()

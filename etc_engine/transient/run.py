@@ -1,0 +1,285 @@
+"""Run of a transient study of kind "network": particles, contacts, system, march, states on disk."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from etc_engine.batch.stop import Stopped, StopRequest
+from etc_engine.box import Box, parse_periodic
+from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.errors import StudyError
+from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
+from etc_engine.packing.dumps import read_trajectory
+from etc_engine.packing.formats import format_to_read, read_particles
+from etc_engine.packing.trajectory import Trajectory
+from etc_engine.solvers.marching import MarchState, march
+from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory
+from etc_engine.transient.states import State, claimed_states, write_state
+from etc_engine.transient.study import Gradient, NetworkStudy, plain
+from etc_engine.transient.systems import SYSTEMS, ParticleSystem, Physics, storing_area
+from etc_engine.walls import value_at
+
+Progress = Callable[[float], None]
+PLANAR_LEVEL = 300_000
+"""Up to so many unknowns the steps of a network of disks are factorised: it pays from the third step on."""
+
+
+@dataclass(frozen=True, eq=False)
+class Transient:
+    """What a transient study came to.
+
+    Parameters
+    ----------
+    study : NetworkStudy
+    network : ContactNetwork
+        At the start.
+    system : ParticleSystem
+        At the start.
+    states : list of MarchState, or of MovingState with [motion]
+        One an output time; fewer if the run was stopped.
+    times : ndarray [s]
+        All output times.
+    trajectory : Trajectory, optional
+        With [motion].
+    resumed : int
+        How many of the states a former run had written.
+    stopped : str
+        The signal that ended the run, empty if it reached the end.
+    """
+
+    study: NetworkStudy
+    network: ContactNetwork
+    system: ParticleSystem
+    states: Sequence[State]
+    times: NDArray[np.float64]
+    trajectory: Trajectory | None = None
+    resumed: int = 0
+    stopped: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """A study made ready: what its states are, and the march from one of them, or from the start."""
+
+    network: ContactNetwork
+    system: ParticleSystem
+    times: NDArray[np.float64]
+    march: Callable[[State | None], Iterator[State]]
+    kind: type[MarchState] | type[MovingState]
+    trajectory: Trajectory | None = None
+
+
+def run_transient(
+    study: NetworkStudy,
+    folder: Path,
+    output: Path | None = None,
+    *,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Transient:
+    """Solve a transient study.
+
+    Parameters
+    ----------
+    study : NetworkStudy
+    folder : Path
+        Where the study file lies: its particle file is relative to it.
+    output : Path, optional
+        The file that is to be written; its states are kept beside it, for `resume`.
+    resume : bool
+        Whether to go on from the last state that a former run has written: it gives the same bits.
+    progress : callable, optional
+        Told the fraction of the time span that is done.
+
+    Returns
+    -------
+    Transient
+
+    Raises
+    ------
+    InputError, GeometryError, PackingError, ConvergenceError, OutputError
+    """
+    course = (_still if study.motion is None else _moving)(study, folder, progress)
+    made = Transient(study, course.network, course.system, [], course.times, course.trajectory)
+    if output is None:
+        return replace(made, states=list(course.march(None)))
+    with (
+        claimed_states(output, _digest(study, course), course.kind, resume=resume) as (place, found),
+        StopRequest() as stop,
+    ):
+        states, resumed = found, len(found)
+        if resumed < course.times.size:
+            marching = course.march(states[-1] if states else None)
+            try:
+                while len(states) < course.times.size:
+                    states.append(stop.run(lambda: next(marching)))
+                    write_state(place, len(states) - 1, states[-1])
+            except Stopped:
+                return replace(made, states=states, resumed=resumed, stopped=stop.reason)
+        return replace(made, states=states, resumed=resumed)
+
+
+def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
+    """One packing, marched over the output times."""
+    packing, column = _particles(study, folder)
+    network = _contacts(study, packing)
+    system = SYSTEMS[study.conduction.method](network, _physics(study, packing.count, column))
+    initial = system.initial(_initial(study, packing))
+    time = study.time
+
+    def marched(restart: State | None) -> Iterator[State]:
+        assert not isinstance(restart, MovingState)
+        return march(
+            system.heat,
+            initial,
+            time.times,
+            scheme=time.scheme,
+            step=time.step,
+            steps=time.steps,
+            tolerance=time.tolerance,
+            exact_level=PLANAR_LEVEL,
+            restart=restart,
+            progress=_fraction(progress, time.times[0], time.times[-1]),
+        )
+
+    return _Course(network, system, np.array(time.times), marched, MarchState)
+
+
+def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
+    """All frames of a dump, each with contacts of its own."""
+    motion, method, time = study.motion, study.conduction.method, study.time
+    assert motion is not None
+    assert study.particles is not None
+    path = folder / study.particles
+    if not path.exists():
+        raise StudyError(f"particles: there is no file {path}")
+    trajectory = read_trajectory(path, motion.timestep)
+    first = trajectory.packings[0]
+    if first.dimension != 2 or first.box.periodic != parse_periodic(study.periodic or first.box.periodic_axes, 2):
+        raise StudyError(f"particles: disks in a box that is periodic along {study.periodic!r} are wanted: {first.box}")
+    physics = _physics(study, first.count, trajectory.conductivity)
+
+    def build(network: ContactNetwork, capacities: NDArray[np.float64]) -> ParticleSystem:
+        heat_capacity = capacities / storing_area(network, method, physics)
+        return SYSTEMS[method](network, replace(physics, heat_capacity=heat_capacity))
+
+    def contacts(packing: ParticlePacking) -> ContactNetwork:
+        return _contacts(study, packing)
+
+    def marched(restart: State | None) -> Iterator[State]:
+        assert not isinstance(restart, MarchState)
+        return march_trajectory(
+            trajectory,
+            contacts,
+            build,
+            _initial(study, first),
+            heat_capacity=physics.heat_capacity,
+            expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
+            scheme=time.scheme,
+            steps=time.steps or 1,
+            tolerance=time.tolerance,
+            restart=restart,
+            progress=_fraction(progress, trajectory.times[0], trajectory.times[-1]),
+        )
+
+    network = contacts(first)
+    system = SYSTEMS[method](network, physics)
+    return _Course(network, system, trajectory.times, marched, MovingState, trajectory)
+
+
+def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> Physics:
+    given = study.conduction.conductivity
+    if given is not None and column is not None:
+        raise StudyError(f"conduction.conductivity: {study.particles} has a column of that name, take one of them out")
+    return Physics(
+        conductivity=column if column is not None else 1.0 if given is None else given,
+        heat_capacity=np.asarray(study.material.heat_capacity, dtype=np.float64),
+        contact_resistance=study.conduction.contact_resistance,
+        walls=study.walls.conditions(),
+        source=_source(study, count),
+        pipe_resistance=study.conduction.pipe_resistance or "chord",
+        dipoles=study.conduction.dipoles,
+    )
+
+
+def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
+    initial = study.material.initial
+    if isinstance(initial, Gradient):
+        return np.asarray(initial.value + packing.centers @ np.array(initial.gradient))
+    return initial
+
+
+def _fraction(progress: Progress | None, begin: float, end: float) -> Progress | None:
+    """A progress that is told the time instead of the fraction that is done."""
+    if progress is None:
+        return None
+    tell = progress
+    return lambda t: tell((t - begin) / (end - begin))
+
+
+def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDArray[np.float64] | None]:
+    """The packing, and the conductivity of each particle where its file gives it."""
+    if study.particles is not None:
+        path = folder / study.particles
+        if not path.exists():
+            raise StudyError(f"particles: there is no file {path}")
+        box = None if study.box is None else Box(study.box, parse_periodic(study.periodic or "", 2))
+        if box is None and not format_to_read(path).brings_box:
+            raise StudyError(f"box: {study.particles} has none, give its edge lengths")
+        table = read_particles(path, box, study.frame)
+        return table.packing, table.conductivity
+    words = study.packing
+    assert words is not None
+    spec = PackingSpec(
+        method=words.method,
+        radii=parse_radii(words.radii),
+        box=Box(words.box, parse_periodic(words.periodic, 2)),
+        count=words.count,
+        density=None if words.density is None else words.density[0],
+        growth_rate=words.growth_rate,
+        radius_growth=study.contacts.rule == "overlap",
+    )
+    return pack(spec, np.random.default_rng(study.seed)), None
+
+
+def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
+    words = study.contacts
+    if words.contact_angle is None:
+        return overlap_contacts(packing)
+    half_angle = float(np.radians(words.contact_angle[0]))
+    if words.rule == "coordination":
+        return coordination_contacts(packing, half_angle, words.coordination or np.nan)
+    return bonded_contacts(packing, half_angle, words.bond_gap)
+
+
+def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.float64]]:
+    """Heat set free in each particle at a time; sources on one particle add up."""
+    parts = []
+    for k, source in enumerate(study.source):
+        rows = np.arange(count) if source.particles is None else np.array(source.particles, dtype=np.int64)
+        if rows.size and rows.max() >= count:
+            raise StudyError(f"source.{k}: there is no particle {rows.max()}, the last one is {count - 1}")
+        parts.append((np.bincount(rows, minlength=count).astype(np.float64), plain(source.heat)))
+
+    def heat(t: float) -> NDArray[np.float64]:
+        return sum((share * value_at(value, t) for share, value in parts), np.zeros(count))
+
+    return heat
+
+
+def _digest(study: NetworkStudy, course: _Course) -> str:
+    """Of the study, of the particles it found and of what conducts between them."""
+    whole = hashlib.sha256(study.digest().encode())
+    packings = [course.network.packing] if course.trajectory is None else course.trajectory.packings
+    box = packings[0].box
+    arrays = [box.lengths, box.periodic, course.times, course.system.heat.conductance.data]
+    arrays += [values for packing in packings for values in (packing.centers, packing.radii)]
+    for values in arrays:
+        whole.update(np.asarray(values, dtype=np.float64).tobytes())
+    return whole.hexdigest()

@@ -1,0 +1,125 @@
+"""Heat through a sheared bed: ``python analyse.py [figure.png]``
+
+The bottom wall is held at 1, the top wall at 0. A disk that travels takes its heat along, so the bed conducts better
+the faster it is sheared: the Peclet number is Pe = shear rate R^2 rho c/kappa.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+from bed import sheared_bed
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+
+from etc_engine import effective_conductivity
+from etc_engine.contacts import ContactNetwork, overlap_contacts
+from etc_engine.dtem.storage import stored_areas
+from etc_engine.packing.trajectory import Trajectory
+from etc_engine.pipe.steady import pipe_conductivity
+from etc_engine.pipe.transient import PipeTransient, pipe_transient
+from etc_engine.transient.moving import MovingState, march_trajectory
+from etc_engine.walls import FixedTemperature
+
+WALLS = {"bottom": FixedTemperature(1.0), "top": FixedTemperature(0.0)}
+PECLET = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
+SETTLED = 8.0
+"""Strain after which the heat flow is averaged: at the fastest, 27 R^2/kappa or 1.4 times H^2/(pi^2 kappa)."""
+SHOWN = (0.0, 4.0, 24.0)
+
+
+def pipes(network: ContactNetwork, capacities: np.ndarray) -> PipeTransient:
+    return pipe_transient(network, WALLS, heat_capacity=capacities / stored_areas(network, "chord"))
+
+
+def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:
+    """Heat in the bed at a shear rate, from the steady state of the bed at rest."""
+    height = bed.packings[0].box.lengths[1]
+    radius = float(bed.packings[0].radii.mean())
+    rate = peclet / radius**2  # kappa = rho c = 1
+    network = overlap_contacts(bed.packings[0])
+    rest = pipe_conductivity(network, axes=(1,)).solutions[0].temperatures[:, 0]
+    start = np.where(np.isnan(rest), 1.0 - bed.packings[0].centers[:, 1] / height, rest)
+    timed = Trajectory(bed.times / rate, bed.packings, bed.ids)
+    return list(march_trajectory(timed, overlap_contacts, pipes, start, steps=2))
+
+
+def flux(bed: Trajectory, states: list[MovingState]) -> tuple[float, float]:
+    """Conductivity from the heat through both walls, and its standard error over ten blocks of strain."""
+    edges = np.linspace(np.searchsorted(bed.times, SETTLED), len(states) - 1, 11).astype(int)
+    lengths = bed.packings[0].box.lengths
+    through = np.array([0.5 * lengths[1] / lengths[0] * (state.heat[2] - state.heat[3]) for state in states])
+    time = np.array([state.time for state in states])
+    blocks = np.diff(through[edges]) / np.diff(time[edges])
+    return float(blocks.mean()), float(blocks.std(ddof=1) / np.sqrt(blocks.size))
+
+
+def main(picture: str = "figure.png") -> None:
+    bed = sheared_bed()
+    late = [packing for time, packing in zip(bed.times, bed.packings, strict=True) if time > SETTLED][::8]
+    networks = [overlap_contacts(packing) for packing in late]
+    still = np.array([pipe_conductivity(network, axes=(1,)).tensor[1, 1] for network in networks])
+    element = np.array([effective_conductivity(network, axes=(1,)).tensor[1, 1] for network in networks])
+    print(
+        f"{bed.count} disks, {len(bed.packings)} frames, coordination {np.mean([n.coordination for n in networks]):.2f}"
+    )
+    print(f"held still, mean over frames: pipe network {still.mean():.4f}, dtem chord {element.mean():.4f}")
+    print(f"{'Pe':>8s}{'k/kappa':>20s}{'opened':>9s}{'imbalance':>12s}")
+    means, errors, states = [], [], []
+    for peclet in PECLET:
+        states = sheared(bed, peclet)
+        mean, error = flux(bed, states)
+        means.append(mean)
+        errors.append(error)
+        last = states[-1]
+        balance = abs(last.stored - last.heat.sum()) / np.abs(last.heat).max()
+        opened = sum(state.opened for state in states)
+        print(f"{peclet:8.3f}{f'{mean:.4f} +- {error:.4f}':>20s}{opened:9d}{balance:12.1e}", flush=True)
+    draw(bed, states, np.array(means), np.array(errors), float(still.mean()), picture)
+
+
+def draw(
+    bed: Trajectory, states: list[MovingState], means: np.ndarray, errors: np.ndarray, still: float, picture: str
+) -> None:
+    figure = Figure(figsize=(10.0, 5.8), layout="constrained")
+    grid = figure.add_gridspec(2, 3, height_ratios=(1.0, 1.6))
+    for column, strain in enumerate(SHOWN):
+        frame = int(np.searchsorted(bed.times, strain))
+        axes = figure.add_subplot(grid[0, column])
+        packing, temperatures = bed.packings[frame], states[frame].temperatures
+        disks = EllipseCollection(
+            2 * packing.radii,
+            2 * packing.radii,
+            np.zeros(packing.count),
+            units="xy",
+            offsets=packing.centers,
+            offset_transform=axes.transData,
+            array=temperatures,
+            cmap="inferno",
+            clim=(0.0, 1.0),
+            edgecolors="black",
+            linewidths=0.2,
+        )
+        axes.add_collection(disks)
+        axes.set(xlim=(0, 1), ylim=(0, 0.5), aspect="equal", xticks=[], yticks=[])
+        axes.set_title(f"strain {strain:g}, Pe = {PECLET[-1]:g}", fontsize=9)
+    figure.colorbar(disks, ax=figure.axes, label="temperature", shrink=0.9)
+    axes = figure.add_subplot(grid[1, :2])
+    axes.axhline(still, color="grey", linestyle="--", linewidth=1.0, label="frames held still, pipe network")
+    axes.errorbar(PECLET, means, errors, marker="o", markersize=4, capsize=2, label="sheared")
+    axes.set(xscale="log", ylim=(0.3, 0.4), xlabel="Peclet number (shear rate R² / diffusivity) [-]")
+    axes.set_ylabel("conductivity across, over that of the disks [-]")
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False, fontsize=8)
+    axes = figure.add_subplot(grid[1, 2])
+    for frame in np.searchsorted(bed.times, SHOWN):
+        heights, temperatures = bed.packings[frame].centers[:, 1], states[frame].temperatures
+        axes.plot(temperatures, heights, ".", markersize=3, label=f"strain {bed.times[frame]:g}")
+    axes.set(xlabel="temperature", ylabel="height")
+    axes.legend(frameon=False, fontsize=8)
+    figure.savefig(picture, dpi=120)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

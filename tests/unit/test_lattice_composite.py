@@ -1,0 +1,184 @@
+"""Composites on a lattice: fitted seeds, phases, exact arrays of spheres, interfaces, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from etc_engine.box import Box
+from etc_engine.composite import MATRIX, Composite
+from etc_engine.errors import EtcError, GeometryError, InputError
+from etc_engine.lattice.fitted import fitted_seeds
+from etc_engine.lattice.homogenize import composite_lattice, homogenize_lattice
+from etc_engine.lattice.phases import find_phases, phase_conductivity
+from etc_engine.lattice.tessellation import laguerre_facets
+from etc_engine.models.arrays import fcc, simple_cubic
+from etc_engine.packing.lubachevsky_stillinger import compress
+from etc_engine.packing.particles import ParticlePacking
+from etc_engine.voxel.homogenize import homogenize_voxel
+
+CUBE = Box((1.0, 1.0, 1.0), (True, True, True))
+CENTRE = [[0.5, 0.5, 0.5]]
+FCC = [[0.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.5, 0.0, 0.5], [0.0, 0.5, 0.5]]
+
+
+def spheres(centers, radius, conductivity=5.0, box=CUBE) -> Composite:
+    return Composite(ParticlePacking(centers, np.full(len(centers), radius), box), 1.0, conductivity)
+
+
+def rng(seed: int = 307) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize(
+    "composite",
+    [
+        spheres(CENTRE, 0.33),
+        spheres([[0.0, 0.1, 0.9]], 0.33),  # cut by the border, whole across it
+        spheres([[0.1, 0.5, 0.5]], 0.3, box=Box((1.0, 1.0, 1.0))),  # cut off by a wall
+        spheres([[0.3, 0.5, 0.5], [0.7, 0.5, 0.5]], 0.2),  # touching
+        spheres([[0.35, 0.5, 0.5], [0.65, 0.5, 0.5]], 0.2),  # overlapping
+    ],
+    ids=["whole", "border", "wall", "touching", "overlapping"],
+)
+def test_fitted_cells_have_the_exact_volume(composite):
+    seeds = fitted_seeds(composite, 1500, rng())
+    volumes = laguerre_facets(seeds.packing).volumes
+    assert volumes[seeds.owner != MATRIX].sum() == pytest.approx(composite.volume_fraction, rel=1e-6)
+    assert seeds.packing.count == pytest.approx(1500, rel=0.1)
+
+
+def test_facets_between_a_pair_of_seeds_lie_on_the_sphere():
+    seeds = fitted_seeds(spheres(CENTRE, 0.3), 2000, rng())
+    facets = laguerre_facets(seeds.packing)
+    across = (seeds.owner[facets.pairs] == 0).sum(axis=1) == 1
+    i = facets.pairs[across, 0]
+    place = seeds.packing.centers[i] + facets.centroids[across] - CENTRE[0]
+    area = facets.areas[across]
+    # the planes touch a sphere that is smaller by kappa h^2 / a^2, half a per cent here, for the volume's sake
+    assert np.linalg.norm(place, axis=1) @ area / area.sum() == pytest.approx(0.3 * (1.0 - 0.005), rel=2e-3)
+    assert area.sum() == pytest.approx(4.0 * np.pi * 0.3**2, rel=0.02)
+
+
+@pytest.mark.parametrize("contrast", [0.0, 0.01, 2.0, 100.0, np.inf])
+@pytest.mark.parametrize("boundary", ["periodic", "walls"])
+def test_simple_cubic_array_is_met(contrast, boundary):
+    made = homogenize_lattice(spheres(CENTRE, 1 / 3, contrast), rng=rng(), particles=3000, boundary=boundary)
+    exact = float(simple_cubic(1.0, contrast, 4.0 * np.pi / 81.0))
+    assert np.diag(made.tensor) == pytest.approx(exact, rel=1.5e-3)
+    assert made.relative_error_estimate < 6e-3
+    assert made.volume_fraction == pytest.approx(4.0 * np.pi / 81.0, rel=2e-6)
+
+
+def test_face_centred_cubic_array_converges_with_order_two():
+    exact = float(fcc(1.0, 50.0, 4 * 4.0 / 3.0 * np.pi * 0.25**3))
+    errors = [
+        abs(np.trace(homogenize_lattice(spheres(FCC, 0.25, 50.0), rng=rng(), particles=n).tensor) / 3.0 / exact - 1.0)
+        for n in (1500, 12_000)
+    ]
+    assert errors[1] < 1.5e-3
+    assert errors[1] < 0.5 * errors[0]  # half the spacing
+
+
+@pytest.mark.parametrize(("contrast", "boundary"), [(7.7, "walls"), (0.05, "periodic")])
+def test_random_spheres_conduct_as_by_fft(contrast, boundary):
+    """An independent method under the same conditions; both are within their error estimates."""
+    packing = compress(np.ones(8), CUBE, rng(31), density=0.3).packing
+    composite = Composite(packing, 1.0, contrast)
+    lattice = homogenize_lattice(composite, rng=rng(), particles=8000, boundary=boundary)
+    fft = homogenize_voxel(composite, resolution=32, boundary=boundary)
+    difference = np.abs(np.diag(lattice.tensor) / np.diag(fft.tensor) - 1.0).max()
+    assert difference < 6e-3
+    assert difference < lattice.relative_error_estimate + fft.relative_error_estimate
+
+
+def test_a_matrix_of_inclusions_is_homogeneous():
+    made = homogenize_lattice(spheres(CENTRE, 0.3, 1.0), rng=rng(), particles=600, tolerance=1e-12)
+    np.testing.assert_allclose(made.tensor, np.eye(3), atol=1e-9)
+    assert made.relative_error_estimate < 1e-9
+
+
+def test_interface_resistance_acts_like_a_lesser_inclusion():
+    """To the dipole that governs a dilute array, k2 becomes k2 / (1 + k2 r / a) (Hasselman and Johnson 1987)."""
+    a, r = 0.2, 0.05
+    made = homogenize_lattice(spheres(CENTRE, a, 5.0), rng=rng(), particles=6000, interface_resistance=r)
+    exact = float(simple_cubic(1.0, 5.0 / (1.0 + 5.0 * r / a), 4.0 / 3.0 * np.pi * a**3))
+    bare = float(simple_cubic(1.0, 5.0, 4.0 / 3.0 * np.pi * a**3))
+    assert abs(np.trace(made.tensor) / 3.0 - exact) < 0.03 * abs(bare - exact)
+
+
+def test_an_infinite_interface_resistance_insulates():
+    sealed = homogenize_lattice(spheres(CENTRE, 0.3, 5.0), rng=rng(), particles=1000, interface_resistance=1e9)
+    void = homogenize_lattice(spheres(CENTRE, 0.3, 0.0), rng=rng(), particles=1000)
+    np.testing.assert_allclose(sealed.tensor, void.tensor, atol=1e-6)
+
+
+def test_the_contact_lattice_is_calibrated_on_itself():
+    made = homogenize_lattice(spheres(CENTRE, 1 / 3, 1.0), rng=rng(), particles=1000, transmission="contact")
+    np.testing.assert_allclose(np.diag(made.tensor), 1.0, rtol=1e-9)
+    other = homogenize_lattice(spheres(CENTRE, 1 / 3, 5.0), rng=rng(), particles=4000, transmission="contact")
+    assert np.trace(other.tensor) / 3.0 == pytest.approx(1.29213137, rel=0.03)
+    assert 1e-4 < other.relative_error_estimate < 0.1
+
+
+def test_the_same_stream_gives_the_same_bits():
+    first, second = (homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(5), particles=500) for _ in range(2))
+    np.testing.assert_array_equal(first.tensor, second.tensor)
+
+
+def test_phases_of_spheres_voxels_and_functions_agree():
+    box, points = Box((1.0, 1.0, 1.0)), rng().random((500, 3))
+    packing = ParticlePacking(CENTRE, [0.3], box)
+
+    def inside(x):
+        return (np.linalg.norm(x - 0.5, axis=1) < 0.3).astype(int)
+
+    grid = (np.stack(np.meshgrid(*[np.arange(80)] * 3, indexing="ij"), axis=-1) + 0.5) / 80
+    voxels = inside(grid.reshape(-1, 3)).reshape(80, 80, 80)
+    exact = inside(points)
+    np.testing.assert_array_equal(find_phases(points, box, packing), exact)
+    np.testing.assert_array_equal(find_phases(points, box, Composite(packing, 1.0, 2.0)), exact)
+    np.testing.assert_array_equal(find_phases(points, box, inside), exact)
+    assert (find_phases(points, box, voxels) != exact).mean() < 0.03
+
+
+def test_voxels_make_layers_that_conduct_as_exactly_as_they_are_drawn():
+    lattice = composite_lattice(spheres(CENTRE, 0.1), 500, rng()).lattice
+    layers = np.repeat([0, 1], 4).reshape(8, 1, 1)
+    phase = find_phases(lattice.packing.centers, lattice.packing.box, layers)
+    np.testing.assert_array_equal(phase, lattice.packing.centers[:, 0] > 0.5)
+
+
+@pytest.mark.parametrize(
+    ("work", "message"),
+    [
+        (lambda: phase_conductivity(np.array([0, 0]), [1.0, 2.0]), "phase 1 is empty"),
+        (lambda: phase_conductivity(np.array([0, 1]), [1.0, -2.0]), "positive and finite"),
+        (lambda: phase_conductivity(np.array([0, 3]), [1.0, 2.0]), "phase 3 has no conductivity"),
+        (
+            lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2), dtype=int)),
+            r"three-dimensional array of integers, found shape \(2, 2\)",
+        ),
+        (lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2, 2))), "of integers"),
+        (lambda: find_phases([[0.1] * 3], CUBE, lambda x: x[:, 0]), "whole phase number"),
+        (lambda: spheres([[1.5, 0.5, 0.5]], 0.1, box=Box((1.0, 1.0, 1.0))), "outside the box"),
+        (lambda: spheres(CENTRE, 0.3, -1.0), "must not be negative"),
+        (lambda: fitted_seeds(spheres(CENTRE, 0.01), 500, rng()), "too small for 500 lattice particles"),
+        (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), particles=3), "at least 50 particles, found 3"),
+        (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), boundary="open"), "unknown boundary 'open'"),
+        (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), transmission="x"), "unknown transmission 'x'"),
+        (
+            lambda: homogenize_lattice(spheres([[0.5, 0.5]], 0.2, box=Box((1.0, 1.0))), rng=rng()),
+            "three-dimensional, found inclusions in 2",
+        ),
+        (
+            lambda: homogenize_lattice(spheres(CENTRE, 0.02), rng=rng(), particles=60, transmission="contact"),
+            "inclusion 0 holds no lattice particle",
+        ),
+    ],
+)
+def test_bad_input_is_one_clear_line(work, message):
+    with pytest.raises((InputError, GeometryError), match=message) as caught:
+        work()
+    assert isinstance(caught.value, EtcError)
+    assert "\n" not in str(caught.value)
