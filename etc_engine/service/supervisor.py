@@ -64,6 +64,7 @@ class Supervisor:
     def start(self) -> None:
         """Take up what an earlier service left running, and begin."""
         for entry in self._queue.entries("running", limit=-1):
+            self._queue.forgive(entry.id)  # whatever ended it may have been the end of the service
             if not entry.batch:
                 self._queue.set_batch(entry.id, self._launcher.find(entry.id))
         self._thread.start()
