@@ -85,7 +85,7 @@ def _measure(study: Study, text: str) -> Application:
         id=study_id(study),
         units=densities * study.statistics.realizations,
         most=most,
-        cells=most * len(study.contacts.contact_angle or (None,)) * len(study.conduction.methods),
+        cells=most * len(study.variants[1] or (None,)) * len(study.conduction.methods),
         particles=expected_particles(study),
     )
 
