@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from etc_engine.composite import Composite
 from etc_engine.errors import InputError
@@ -88,26 +89,50 @@ def solve_section(
     return Section((lengths[0], lengths[1]), image.fractions, flux)
 
 
-def sample(field: NDArray[np.float64], points: ArrayLike, lengths: tuple[float, ...]) -> NDArray[np.float64]:
-    """Values of the voxels that hold given points.
+def temperature_between_walls(gradients: NDArray[np.float64], axis: int, length: float) -> NDArray[np.float64]:
+    """Temperature in the voxels of a cell between walls, 0 at the low one, for a unit mean gradient.
 
     Parameters
     ----------
-    field : ndarray, shape (..., n1, n2[, n3])
+    gradients : ndarray, shape (d, n1, n2[, n3])
+        Of the load along the axis, from `etc_engine.voxel.cell.solve_cell` with walls.
+    axis : int
+        Normal of the isothermal walls.
+    length : float [m]
+        Distance of the walls.
+
+    Returns
+    -------
+    ndarray, shape (n1, n2[, n3]) [K]
+        For a mean gradient of 1 K/m.
+
+    Examples
+    --------
+    >>> temperature_between_walls(np.ones((2, 2, 3)), 1, 6.0)[0]
+    array([1., 3., 5.])
+    """
+    along = gradients[axis] * (length / gradients.shape[1 + axis])
+    return np.asarray(np.cumsum(along, axis=axis) - 0.5 * along)
+
+
+def sample(field: NDArray[np.float64], points: ArrayLike, lengths: tuple[float, ...]) -> NDArray[np.float64]:
+    """Values at points, linear between the centres of the voxels.
+
+    Parameters
+    ----------
+    field : ndarray, shape (n1, n2[, n3])
     points : array_like, shape (m, d) [m]
     lengths : tuple of float [m]
         Edges of the cell.
 
     Returns
     -------
-    ndarray, shape (..., m)
+    ndarray, shape (m,)
 
     Examples
     --------
-    >>> sample(np.array([[1.0, 2.0], [3.0, 4.0]]), [[0.1, 0.9]], (1.0, 1.0))
-    array([2.])
+    >>> sample(np.array([[1.0, 2.0], [3.0, 4.0]]), [[0.25, 0.5]], (1.0, 1.0))
+    array([1.5])
     """
-    points = np.asarray(points, dtype=np.float64)
-    shape = np.array(field.shape[field.ndim - points.shape[1] :])
-    index = np.clip((points / np.asarray(lengths) * shape).astype(np.int64), 0, shape - 1)
-    return field[(..., *index.T)]
+    places = np.asarray(points, dtype=np.float64) / np.asarray(lengths) * np.array(field.shape) - 0.5
+    return np.asarray(map_coordinates(field, places.T, order=1, mode="nearest"))
