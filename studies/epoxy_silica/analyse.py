@@ -183,8 +183,10 @@ def draw(data: xr.Dataset) -> Figure:
         ("lattice", "#cc79a7", "^", 0.004, "particle lattice"),
     ):
         known = data[name].count("realization").values
-        mean, spread = data[name].mean("realization").values, data[name].std("realization", ddof=1).values
-        left.plot(x + shift, mean, marker, color=colour, markersize=6, label=f"{label}, {known.max()} cells")
+        mean = data[name].mean("realization").values
+        spread = data[name].std("realization", ddof=1).values if known.max() > 1 else np.zeros_like(mean)
+        cells = f"{known.max()} cells" if known.max() > 1 else "one cell"
+        left.plot(x + shift, mean, marker, color=colour, markersize=6, label=f"{label}, {cells}")
         right.errorbar(
             x + shift,
             100.0 * (mean / third - 1.0),
@@ -194,6 +196,9 @@ def draw(data: xr.Dataset) -> Figure:
             capsize=2,
             markersize=5,
         )
+    limit = data["voxel_extrapolated"].mean("realization").values
+    right.plot(x + 0.012, 100.0 * (limit / third - 1.0), "o", color="#0072b2", fillstyle="none", markersize=5)
+    left.plot([], [], "o", color="#0072b2", fillstyle="none", label="FFT extrapolated, the lattice's cell (right)")
     left.set_xlabel("volume fraction of silica")
     right.set_xlabel("volume fraction of silica")
     left.set_ylabel("effective conductivity [W/(m K)]")
