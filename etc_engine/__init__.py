@@ -19,21 +19,26 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from etc_engine.box import Box
     from etc_engine.comparison import evaluate_models
+    from etc_engine.composite import Composite
     from etc_engine.contacts import ContactNetwork, bonded_contacts, overlap_contacts
     from etc_engine.dtem.field import ParticleField, recover_field
     from etc_engine.dtem.interior import temperatures_inside
     from etc_engine.dtem.steady import solve_steady
     from etc_engine.effective import EffectiveConductivity, effective_conductivity, mean_field_conductivity
     from etc_engine.errors import EtcError
+    from etc_engine.lattice.homogenize import homogenize_lattice
     from etc_engine.models.catalogue import evaluate as evaluate_model
     from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii, solid_fraction
     from etc_engine.packing.dumps import read_dump
     from etc_engine.packing.files import read_csv
     from etc_engine.percolation import find_backbone
+    from etc_engine.pipe.steady import pipe_conductivity
     from etc_engine.realization import RealizationSpec, realize
+    from etc_engine.voxel.homogenize import homogenize_voxel
 
 _HOMES = {
     "Box": "box",
+    "Composite": "composite",
     "ContactNetwork": "contacts",
     "EffectiveConductivity": "effective",
     "EtcError": "errors",
@@ -46,10 +51,13 @@ _HOMES = {
     "evaluate_model": "models.catalogue:evaluate",
     "evaluate_models": "comparison",
     "find_backbone": "percolation",
+    "homogenize_lattice": "lattice.homogenize",
+    "homogenize_voxel": "voxel.homogenize",
     "mean_field_conductivity": "effective",
     "overlap_contacts": "contacts",
     "pack": "packing",
     "parse_radii": "packing",
+    "pipe_conductivity": "pipe.steady",
     "read_csv": "packing.files",
     "read_dump": "packing.dumps",
     "realize": "realization",
@@ -61,6 +69,7 @@ _HOMES = {
 
 __all__ = [
     "Box",
+    "Composite",
     "ContactNetwork",
     "EffectiveConductivity",
     "EtcError",
@@ -73,10 +82,13 @@ __all__ = [
     "evaluate_model",
     "evaluate_models",
     "find_backbone",
+    "homogenize_lattice",
+    "homogenize_voxel",
     "mean_field_conductivity",
     "overlap_contacts",
     "pack",
     "parse_radii",
+    "pipe_conductivity",
     "read_csv",
     "read_dump",
     "realize",

@@ -46,7 +46,9 @@ def draw_calibration(points: Mapping[str, NDArray[np.float64]], mean_field: NDAr
             rows[:, 0], rows[:, 1], rows[:, 2], color=colour, marker=marker, markersize=4, linewidth=1.1, capsize=2,
             label=label,
         )  # fmt: skip
-    axes.plot(mean_field[:, 0], mean_field[:, 1], "--", color=GREY, linewidth=1.0, label="mean field (lower bound)")
+    axes.plot(
+        mean_field[:, 0], mean_field[:, 1], "--", color=GREY, linewidth=1.0, label="mean field, periodic (lower bound)"
+    )
     axes.set_xscale("log")
     _finish(axes, "particles N", "transmission coefficient $C_t$ [-]")
     return figure
@@ -168,6 +170,7 @@ def draw_fractions(lines: Series, points: Sequence[tuple[str, NDArray[np.float64
     for (label, (x, y)), colour in zip(lines.items(), COLOURS[2:], strict=False):
         axes.plot(x, y, "-", color=colour, linewidth=1.0, label=label)
     for (label, rows), colour, marker in zip(points, COLOURS, MARKERS, strict=False):
-        axes.errorbar(*rows.T, fmt=marker, color=colour, markersize=5, capsize=2, linewidth=1.0, label=label)
+        x, y, width = rows.T
+        axes.errorbar(x, y, width, fmt=marker, color=colour, markersize=5, capsize=2, linewidth=1.0, label=label)
     _finish(axes, "volume fraction of inclusions [-]", "conductivity [W m$^{-1}$ K$^{-1}$]")
     return figure

@@ -65,7 +65,7 @@ class LocalLauncher:
     store: Store
     settings: Settings
     concurrent: int = 1
-    interval: float = 0.1
+    interval: float = 0.2
     outlives: bool = False
     _children: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 

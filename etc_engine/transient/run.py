@@ -26,6 +26,8 @@ from etc_engine.transient.systems import SYSTEMS, ParticleSystem, Physics, stori
 from etc_engine.walls import value_at
 
 Progress = Callable[[float], None]
+PLANAR_LEVEL = 300_000
+"""Up to so many unknowns the steps of a network of disks are factorised: it pays from the third step on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +143,7 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
             step=time.step,
             steps=time.steps,
             tolerance=time.tolerance,
+            exact_level=PLANAR_LEVEL,
             restart=restart,
             progress=_fraction(progress, time.times[0], time.times[-1]),
         )

@@ -59,7 +59,7 @@ def main() -> None:
     table = []
     for count in (n for n in SIZES if n <= arguments.largest):
         found = measure(count, arguments.realizations if count <= 10_000 else 1)
-        spread = {name: values.std(ddof=1) if values.size > 1 else 0.0 for name, values in found.items()}
+        spread = {name: values.std(ddof=1) if values.size > 1 else np.nan for name, values in found.items()}
         means = [(found[name].mean(), spread[name]) for name in ("mirror", "particle", "periodic")]
         table.append([count, *np.ravel(means), found["mean_field"].mean(), found["density"].mean()])
     rows = np.array(table)

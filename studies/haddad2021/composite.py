@@ -32,12 +32,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--particles", type=int, default=20_000)
     parser.add_argument("--full", action="store_true")
+    parser.add_argument("--fractions", default="0.1,0.2,0.3,0.4,0.5")
     parser.add_argument("--output", type=Path, default=HERE)
     arguments = parser.parse_args()
     particles = 100_000 if arguments.full else arguments.particles
     arguments.output.mkdir(parents=True, exist_ok=True)
     rows = []
-    for fraction in (0.1, 0.2, 0.3, 0.4, 0.5):
+    for fraction in map(float, arguments.fractions.split(",")):
         rng = np.random.default_rng([SEED, round(100 * fraction)])
         count = round(fraction * SCALE**3 * 6.0 / np.pi)
         box = Box((1.0, 1.0, 1.0), (True, True, True))

@@ -42,6 +42,7 @@ def test_other_hosts_need_a_token(tmp_path, refused):
     refused("at least 16", *where, tmp_path / "token")
     refused("cannot be read", *where, tmp_path / "none")
     refused("expected one word", *where[:4], ETC_ENGINE_TOKEN="word one two three four")
+    refused("brings requests of other machines", "--data", tmp_path / "d", "--allow-host", "etc.example.org")
     assert not (tmp_path / "d").exists()
 
 

@@ -1,7 +1,7 @@
 "use strict";
 // The page of the service: it only asks what any client can ask, and writes text, never markup, into the document.
 
-const BUSY_SECONDS = 1.5, IDLE_SECONDS = 4, HIDDEN_SECONDS = 20;
+const BUSY_SECONDS = 2, IDLE_SECONDS = 4, HIDDEN_SECONDS = 20, QUEUE_TURNS = 2;
 const $ = id => document.getElementById(id);
 let about = null, catalogue = null, view = { poll: null }, token = sessionStorage.getItem("etc-token") || "";
 let draft = null; // what was typed into the form of a new study, kept while other parts are looked at
@@ -266,7 +266,7 @@ function study(id) {
   const buttons = h("div", { class: "buttons" }), plot = h("figure"), table = h("div", { class: "wide" });
   const models = h("div"), log = h("pre", { tabindex: "0", "aria-label": "end of the log" });
   const shown = new Set();
-  let known = "", drawn = "", chosen = false;
+  let known = "", drawn = "", chosen = false, lagging = false, units = -1;
 
   const act = (label, action, style) => h("button", { class: style || null, onclick: async () => {
     try { await action(); alarm(""); await poll(); } catch (error) { alarm(error.message); }
@@ -341,8 +341,11 @@ function study(id) {
     log.textContent = found.log || "nothing yet";
     fillButtons(found);
     const version = `${found.state} ${found.done}`;
-    if (version !== drawn || found.state === "running") {
-      drawFigure(await get(`/api/studies/${id}/curve`));
+    if (version !== drawn || lagging) { // asked for again only when there is something new
+      const curve = await get(`/api/studies/${id}/curve`);
+      if (curve.units !== units || version !== drawn) drawFigure(curve);
+      units = curve.units;
+      lagging = found.state === "running" && units < found.done;
       drawn = version;
     }
     return found.state === "running" || found.state === "queued";
@@ -444,13 +447,13 @@ async function route() {
   } catch (error) { alarm(error.message); }
 }
 
-let ticking = null;
+let ticking = null, turn = 0, busyQueue = false;
 async function tick() {
   clearTimeout(ticking);
   let busy = false;
   try {
-    busy = await refreshQueue();
-    if (view.poll) busy = await view.poll() || busy;
+    if (turn++ % QUEUE_TURNS === 0 || !view.poll) busyQueue = await refreshQueue();
+    busy = view.poll && await view.poll() || busyQueue;
     alarm("");
   } catch (error) { if (error.status !== 401) alarm(error.message); }
   const seconds = document.hidden ? HIDDEN_SECONDS : busy ? BUSY_SECONDS : IDLE_SECONDS;
