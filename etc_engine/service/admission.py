@@ -20,6 +20,9 @@ SOURCE = "study"
 FULL = 1.0
 """A density no packing without a count is expected to exceed."""
 
+BASE_BYTES, PARTICLE_BYTES = 250e6, 1600.0
+"""Memory of a rank: of its libraries, and of a particle (measured with a million disks and method chord)."""
+
 
 @dataclass(frozen=True)
 class Application:
@@ -82,7 +85,7 @@ def _measure(study: Study, text: str) -> Application:
         id=study_id(study),
         units=densities * study.statistics.realizations,
         most=most,
-        cells=most * len(study.contacts.contact_angle or (None,)) * len(study.conduction.methods),
+        cells=most * len(study.variants[1] or (None,)) * len(study.conduction.methods),
         particles=expected_particles(study),
     )
 
@@ -110,6 +113,11 @@ def _refuse_excess(found: Application, limits: Limits) -> None:
     ):
         if not value <= limit:
             raise StudyError(f"{SOURCE}: {field}: makes about {value:.6g} {what}, this service allows {limit}")
+    memory, allowed = (BASE_BYTES + PARTICLE_BYTES * found.particles) / 1e6, limits.memory_bytes / 1e6
+    if memory > allowed:
+        raise StudyError(
+            f"{SOURCE}: packing.box: takes about {memory:.0f} MB of memory a rank, this service allows {allowed:.0f}"
+        )
 
 
 def field_of(message: str) -> str:

@@ -28,7 +28,7 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     -------
     dict
         ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``, each with ``contact_angle``
-        [degree], ``method``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities; ``models`` with
+        [degree] or ``contrast``, ``method``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities; ``models`` with
         their lines, ``remark`` where there are none, ``bounds_broken``. A number that is not there is None.
     """
     units = int((dataset["worker_rank"].values >= 0).sum())
@@ -53,15 +53,16 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
 
 def _places(statistics: xarray.Dataset) -> list[dict[str, int]]:
     """One index for every curve."""
-    names = [name for name in ("contact_angle", "method") if name in statistics["conductivity_mean"].dims]
+    names = [name for name in ("contact_angle", "contrast", "method") if name in statistics["conductivity_mean"].dims]
     sizes = [statistics.sizes[name] for name in names]
     return [dict(zip(names, place, strict=True)) for place in np.ndindex(*sizes)]
 
 
 def _series(cell: xarray.Dataset) -> dict[str, Any]:
-    angle, method = cell.coords.get("contact_angle"), cell.coords.get("method")
+    angle, contrast, method = (cell.coords.get(name) for name in ("contact_angle", "contrast", "method"))
     return {
         "contact_angle": None if angle is None else float(angle),
+        "contrast": None if contrast is None else float(contrast),
         "method": None if method is None else str(method.values),
         "mean": plain(cell["conductivity_mean"].values),
         "low": plain(cell["conductivity_ci_low"].values),
@@ -79,7 +80,7 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
         one = comparison.sel(model=name)
         value = one["model_conductivity"]
         if str(name) in drawn:
-            density, curves = lines["density"].values, [drawn[str(name)]]
+            density, curves = lines["density"].values, list(np.atleast_2d(drawn[str(name)]))
         else:  # the contact mean field: values on the sweep only, a curve for every angle and method
             density = comparison["density"].values
             curves = [_over_density(value.isel(place)) for place in _places(comparison)]

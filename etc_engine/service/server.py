@@ -23,6 +23,7 @@ from etc_engine.service.store import open_store
 from etc_engine.service.supervisor import Supervisor
 
 BACKLOG = 256
+CONNECTIONS = 1000
 
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
@@ -59,6 +60,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             server_header=False,
             lifespan="off",
             timeout_graceful_shutdown=5,
+            limit_concurrency=CONNECTIONS,
             forwarded_allow_ips="",
         )
         # the server gives signals on to the handlers it found: these let the batches end in order

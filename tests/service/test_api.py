@@ -206,7 +206,7 @@ def test_unknown_studies_and_files_are_404(service):
 
 
 def test_cancel_resume_and_remove(tmp_path):
-    environment = {"ETC_TEST_SECONDS": "0.8"}
+    environment = {"ETC_TEST_SECONDS": "0.6"}
     with Service(tmp_path / "data", slow=True, environment=environment) as service:
         server = service.server
         running, waiting = client.submit(server, STUDY)["id"], client.submit(server, renamed("second"))["id"]
@@ -239,12 +239,12 @@ def test_cancel_resume_and_remove(tmp_path):
 
 
 def test_a_time_limit_ends_a_study_and_says_so(tmp_path):
-    options = {"limits": {"study_seconds": 2.5}}
+    options = {"limits": {"study_seconds": 1.5}}
     with Service(tmp_path / "data", options, {"ETC_TEST_SECONDS": "2"}, slow=True) as service:
         study = client.submit(service.server, STUDY)["id"]
         ended = client.wait(service.server, study, interval=0.1)
         assert ended["state"] == "failed"
-        assert "time limit of this service, 2.5 s" in ended["reason"]
+        assert "time limit of this service, 1.5 s" in ended["reason"]
 
 
 @pytest.mark.parametrize(

@@ -198,7 +198,7 @@ def test_garbage_on_the_line_leaves_the_service_well(service):
     ):
         assert b" 500 " not in raw(service, bytes_)[:64]
     connection = http.client.HTTPConnection(service.url.removeprefix("http://"), timeout=20)
-    connection.request("BREW", "/api/studies")
+    connection.request("PATCH", "/api/studies")
     assert connection.getresponse().status == 405
     connection.close()
     assert until(lambda: ask(f"{service.url}/api/studies")[0] == 200)

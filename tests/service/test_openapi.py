@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -13,10 +14,13 @@ from serving import STUDY, ask
 from etc_engine.service import client
 
 CHECKS = "not_a_server_error,content_type_conformance,response_schema_conformance"
+EXAMPLES = int(os.environ.get("ETC_FUZZ", "0"))
+"""With ETC_FUZZ=100 the stranger takes his time: every phase, so many examples of each operation."""
 RUNS = {
-    "everything": ["--exclude-path", "/api/solve", "--max-examples", "15", "--phases", "coverage,fuzzing"],
-    "solve": ["--include-path", "/api/solve", "--max-examples", "5", "--phases", "fuzzing"],
+    "everything": ["--exclude-path", "/api/solve", "--max-examples", str(EXAMPLES or 8)],
+    "solve": ["--include-path", "/api/solve", "--max-examples", str(EXAMPLES or 3)],
 }
+PHASES = [] if EXAMPLES else ["--phases", "fuzzing"]
 
 
 def test_every_operation_is_described(service):
@@ -40,8 +44,10 @@ def test_no_request_makes_the_service_stumble(service, tmp_path, run):
     client.wait(service.server, study, interval=0.05)
     (tmp_path / "schemathesis.toml").write_text(f'[parameters]\n"path.study" = ["{study}", "0123456789abcdef", "x"]\n')
     line = [sys.executable, "-m", "schemathesis.cli", "--config-file", str(tmp_path / "schemathesis.toml"), "run"]
-    line += [f"{service.url}/openapi.json", "--checks", CHECKS, "--no-color", *RUNS[run]]
-    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=tmp_path, timeout=250)
+    line += [f"{service.url}/openapi.json", "--checks", CHECKS, "--no-color", *RUNS[run], *PHASES]
+    done = subprocess.run(
+        line, capture_output=True, text=True, check=False, cwd=tmp_path, timeout=280 if not EXAMPLES else None
+    )
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
     assert "Test cases:" in done.stdout
     print(done.stdout[-1500:])

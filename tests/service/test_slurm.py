@@ -92,7 +92,7 @@ def test_a_study_goes_through_sbatch_with_the_script_of_jobs(site):
 
 
 def test_several_studies_wait_in_slurm_and_one_is_cancelled(site):
-    with cluster(site, "1.5") as service:
+    with cluster(site, "0.8") as service:
         first = client.submit(service.server, STUDY)["id"]
         second = client.submit(service.server, renamed("second"))["id"]
         until(lambda: all(client.status(service.server, one)["done"] >= 1 for one in (first, second)))
@@ -107,7 +107,7 @@ def test_several_studies_wait_in_slurm_and_one_is_cancelled(site):
 
 
 def test_a_job_outlives_the_service_and_is_found_by_its_name(site):
-    service = cluster(site, "1")
+    service = cluster(site, "0.7")
     with service:
         study = client.submit(service.server, STUDY)["id"]
         until(lambda: client.status(service.server, study)["done"] >= 1)
