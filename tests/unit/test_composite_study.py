@@ -12,6 +12,7 @@ from etc_engine.comparison import evaluate_models
 from etc_engine.errors import StudyError
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import CompositeSpec, ConductionSpec, ContactSpec, RealizationSpec, Status, realize
+from etc_engine.service.curve import curve_of
 
 STUDY = """
 schema = 1
@@ -122,6 +123,12 @@ def test_a_sweep_compares_each_contrast_with_models_of_its_own(etc_engine, tmp_p
     maxwell = comparison.model_conductivity.sel(model="maxwell", density=0.2)
     beta = (np.array([2.0, 10.0]) - 1.0) / (np.array([2.0, 10.0]) + 1.0)
     np.testing.assert_allclose(maxwell, 0.5 * (1.0 + 0.2 * beta) / (1.0 - 0.2 * beta), rtol=1e-5)
+    curve = curve_of(data)
+    assert [series["contrast"] for series in curve["series"]] == [2.0, 10.0]
+    lines = {model["name"]: model["curves"] for model in curve["models"]}
+    low, high = (line[-1] for line in lines["maxwell"])
+    assert low == pytest.approx(float(comparison.model_conductivity.sel(model="maxwell", density=0.4, contrast=2.0)))
+    assert high > low
     shown = etc_engine("compare", out, "-o", tmp_path / "figure.png")
     assert shown.returncode == 0
     assert "a matrix of 0.5 W/(m K)" in shown.stdout
