@@ -248,7 +248,9 @@ def study_report(request: Request, study: Id) -> FileResponse:
 @api.post("/solve", openapi_extra=PARTICLES_BODY)
 async def solve(
     request: Request,
-    box: Annotated[str | None, Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, such as 1,1")] = None,
+    box: Annotated[
+        str | None, Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, for CSV", examples=["1,1"])
+    ] = None,
     periodic: Annotated[str | None, Query(pattern="^[xyz]{0,3}$")] = None,
     frame: Annotated[int | None, Query(ge=-(10**9), le=10**9)] = None,
     method: Annotated[str, Query(pattern="^[a-z]{1,20}$")] = "chord",

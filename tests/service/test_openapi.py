@@ -15,12 +15,12 @@ from etc_engine.service import client
 
 CHECKS = "not_a_server_error,content_type_conformance,response_schema_conformance"
 EXAMPLES = int(os.environ.get("ETC_FUZZ", "0"))
-"""With ETC_FUZZ=100 the stranger takes his time: every phase, so many examples of each operation."""
+"""With ETC_FUZZ=60 the stranger takes his time: more phases, so many examples of each operation."""
 RUNS = {
     "everything": ["--exclude-path", "/api/solve", "--max-examples", str(EXAMPLES or 8)],
     "solve": ["--include-path", "/api/solve", "--max-examples", str(EXAMPLES or 3)],
 }
-PHASES = [] if EXAMPLES else ["--phases", "fuzzing"]
+PHASES = ["--phases", "coverage,fuzzing,stateful" if EXAMPLES else "fuzzing"]
 
 
 def test_every_operation_is_described(service):
@@ -34,6 +34,26 @@ def test_every_operation_is_described(service):
         for status in refusals:
             schema = operation["responses"][status]["content"]["application/json"]["schema"]
             assert schema == {"$ref": "#/components/schemas/Problem"}
+
+
+def test_the_examples_are_good(service):
+    """The same study twice, and a solve with its option."""
+    description = json.loads(ask(f"{service.url}/openapi.json")[2])
+    paths = description["paths"]
+    study = paths["/api/studies"]["post"]["requestBody"]["content"]
+    solve = paths["/api/solve"]["post"]
+    checked = [
+        ask(f"{service.url}/api/studies/check", "POST", body, content_type=kind)
+        for kind, body in (
+            ("application/toml", study["application/toml"]["example"].encode()),
+            ("application/json", json.dumps(study["application/json"]["example"]).encode()),
+        )
+    ]
+    assert [status for status, _, _ in checked] == [200, 200]
+    assert len({json.loads(body)["id"] for _, _, body in checked}) == 1
+    box = next(item for item in solve["parameters"] if item["name"] == "box")["schema"]["examples"][0]
+    particles = solve["requestBody"]["content"]["text/csv"]["example"].encode()
+    assert client.solve(service.server, particles, box=box)["percolates"]
 
 
 @pytest.mark.slow
