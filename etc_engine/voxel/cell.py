@@ -13,6 +13,7 @@ from etc_engine.errors import InputError
 from etc_engine.voxel.conductivity import VoxelConductivity, voxel_conductivity
 from etc_engine.voxel.green import GradientProjection, gradient_projection
 from etc_engine.voxel.iterations import LoadSolution, Projection, solve_conjugate_gradients, solve_eyre_milton
+from etc_engine.voxel.walls import WallProjection, wall_projection
 
 SOLVERS = ("cg", "eyre-milton")
 BOUNDARIES = ("periodic", "walls")
@@ -70,8 +71,8 @@ def solve_cell(
     lengths : sequence of float [m]
         Edges of the cell.
     boundary : str
-        ``periodic``; or ``walls``: along each axis between two isothermal faces, the others adiabatic, which is
-        the periodic cell of the image and its mirror images (2^d times the voxels).
+        ``periodic``; or ``walls``: along each axis between two isothermal faces, the others adiabatic. That is the
+        periodic cell of the image and its mirror images, solved by sines and cosines at the size of the image.
     solver : str
         ``cg`` or ``eyre-milton``.
     green : str
@@ -112,25 +113,29 @@ def solve_cell(
     image = voxel_conductivity(conductivity)
     d = len(image.shape)
     _check(image, lengths, boundary, solver, tolerance, threads)
-    if boundary == "walls":
-        image = image.mirrored()
-        lengths = [2.0 * length for length in lengths]
     spacing = tuple(length / count for length, count in zip(lengths, image.shape, strict=True))
-    projection = gradient_projection(image.shape, spacing, green, threads)
     perfect = bool(np.isinf(image.extremes()[1]))
     wanted = tuple(range(d)) if axes is None else axes
-    if perfect:
-        tensor, loads = _solve_fluxes(image, projection, tolerance, limit)
-    else:
-        tensor, loads = _solve_loads(image, projection.onto_gradients, wanted, solver, tolerance, limit, keep_gradients)
-    if boundary == "walls":
-        tensor = np.where(np.eye(d, dtype=bool), tensor, np.nan)
+    tensor, loads = np.full((d, d), np.nan), []
+    for group in (wanted,) if boundary == "periodic" else tuple((axis,) for axis in wanted):
+        projection: GradientProjection | WallProjection
+        if boundary == "periodic":
+            projection = gradient_projection(image.shape, spacing, green, threads)
+        else:
+            projection = wall_projection(image.shape, spacing, group[0], green, threads)
+        if perfect:
+            part, found = _solve_fluxes(image, projection, group, tolerance, limit)
+        else:
+            part, found = _solve_loads(
+                image, projection.onto_gradients, group, solver, tolerance, limit, keep_gradients
+            )
+        known = np.ix_(group, group)
+        tensor[known] = part[known]
+        loads += found
     kept: tuple[NDArray[np.float64], ...] = ()
     if keep_gradients and not perfect:
-        inside = (slice(None), *(slice(n // 2 if boundary == "walls" else n) for n in image.shape))
         kept = tuple(
-            load.fluctuation[inside] + np.eye(d)[axis].reshape(d, *(1,) * d)
-            for axis, load in zip(wanted, loads, strict=True)
+            load.fluctuation + np.eye(d)[axis].reshape(d, *(1,) * d) for axis, load in zip(wanted, loads, strict=True)
         )
     return CellSolution(tensor, max(load.iterations for load in loads), max(load.error for load in loads), kept)
 
@@ -204,17 +209,25 @@ def _solve_loads(
 
 
 def _solve_fluxes(
-    image: VoxelConductivity, projection: GradientProjection, tolerance: float, limit: int
+    image: VoxelConductivity,
+    projection: GradientProjection | WallProjection,
+    axes: tuple[int, ...],
+    tolerance: float,
+    limit: int,
 ) -> tuple[NDArray[np.float64], list[LoadSolution]]:
     """Mean fluxes along each axis through the resistivities, which vanish in perfect conductors."""
     d = len(image.shape)
     with np.errstate(divide="ignore"):  # scalars of anisotropic voxels are not used and may be 0
         resistivity = image.of(np.reciprocal)
-    tensor, loads = _solve_loads(resistivity, projection.onto_fluxes, tuple(range(d)), "cg", tolerance, limit)
-    if np.linalg.eigvalsh(tensor)[0] <= SINGULAR * float(np.diag(resistivity.mean()).max()):
-        along = AXES[int(np.argmin(np.diag(tensor)))]
+    if isinstance(projection, GradientProjection):
+        axes = tuple(range(d))  # the inverse takes them all
+    found, loads = _solve_loads(resistivity, projection.onto_fluxes, axes, "cg", tolerance, limit)
+    known = np.ix_(axes, axes)
+    if np.linalg.eigvalsh(found[known])[0] <= SINGULAR * float(np.diag(resistivity.mean()).max()):
+        along = AXES[axes[int(np.argmin(np.diag(found[known])))]]
         raise InputError(
             f"perfect conductors (inf) join across the cell along {along}: the effective conductivity is infinite; "
             "give them a finite conductivity"
         )
-    return np.asarray(np.linalg.inv(tensor), dtype=np.float64), loads
+    found[known] = np.linalg.inv(found[known])
+    return found, loads

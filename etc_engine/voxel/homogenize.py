@@ -9,10 +9,10 @@ import numpy as np
 from etc_engine.composite import Composite, Homogenized
 from etc_engine.errors import ConvergenceError
 from etc_engine.voxel.cell import CellSolution, solve_cell
-from etc_engine.voxel.voxelization import check_resolution, voxelize
+from etc_engine.voxel.voxelization import check_resolution, smallest_diameter, voxelize
 
-COARSEST = 4
-"""Voxels along an edge of the coarsest grid that takes part in the error estimate."""
+COARSEST = 4.0
+"""Voxels across the smallest inclusion of the coarsest grid that takes part in the error estimate."""
 
 RINGING_LIMIT = 300
 """Iterations after which the continuous Green operator is left out of the error estimate."""
@@ -68,8 +68,9 @@ def homogenize_voxel(
     .. math:: \varepsilon = \varepsilon_{solver} +
               \max\big(2 |k_h - k_{2h}|, |k_{2h} - k_{4h}|, |k_h - k^{cont}_{2h}|\big) / k_h
 
-    with the largest over the axes, where cont is the continuous Green operator, whose error has the other sign (left
-    out at contrast 0 and infinity, where it does not converge).
+    with the largest over the axes. The second is left out where an inclusion spans less than 4 voxels of size 4h; cont
+    is the continuous Green operator, whose error has the other sign (left out at contrast 0 and infinity, where it
+    does not converge).
 
     References
     ----------
@@ -109,7 +110,7 @@ def homogenize_voxel(
         half, quarter = (resolution + 1) // 2, (resolution + 3) // 4
         middle = solve(half, green)[0]
         differences = [2.0 * _difference(fine, middle)]
-        if quarter >= COARSEST:
+        if smallest_diameter(composite, quarter) >= COARSEST:
             differences.append(_difference(middle, solve(quarter, green)[0]))
         least, largest = composite.contrast
         if least > 0.0 and np.isfinite(largest) and composite.matrix > 0.0:

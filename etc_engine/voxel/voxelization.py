@@ -70,6 +70,13 @@ def grid_shape(lengths: tuple[float, ...], resolution: int) -> tuple[int, ...]:
     return tuple(max(round(resolution * length / shortest), resolution) for length in lengths)
 
 
+def smallest_diameter(composite: Composite, resolution: int) -> float:
+    """Diameter of the smallest inclusion in voxels."""
+    box = composite.inclusions.box
+    step = max(length / n for length, n in zip(box.lengths, grid_shape(box.lengths, resolution), strict=True))
+    return 2.0 * float(composite.inclusions.radii.min()) / step
+
+
 def check_resolution(composite: Composite, resolution: int) -> None:
     """Refuse a grid with fewer than `FEWEST` voxels across the smallest inclusion.
 
@@ -77,14 +84,13 @@ def check_resolution(composite: Composite, resolution: int) -> None:
     ------
     InputError
     """
-    box = composite.inclusions.box
-    step = max(length / n for length, n in zip(box.lengths, grid_shape(box.lengths, resolution), strict=True))
-    diameter = 2.0 * float(composite.inclusions.radii.min())
-    if diameter < FEWEST * step * (1.0 - 1e-12):
-        needed = int(np.ceil(FEWEST * min(box.lengths) / diameter))
+    spanned = smallest_diameter(composite, resolution)
+    if spanned < FEWEST * (1.0 - 1e-12):
+        diameter = 2.0 * float(composite.inclusions.radii.min())
+        needed = int(np.ceil(FEWEST * min(composite.inclusions.box.lengths) / diameter))
         raise InputError(
             f"resolution {resolution} is too coarse: the smallest inclusion, of diameter {diameter:.6g}, spans "
-            f"{diameter / step:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
+            f"{spanned:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
         )
 
 

@@ -68,6 +68,8 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
                 f"grid error estimate {100 * error:.2f} %"
             )
     axes.axhline(0.0, color="k", linewidth=0.8)
+    axes.plot([], [], ":", color="grey", label="three-point bounds")
+    axes.plot([], [], "--", color="grey", label="Hashin-Shtrikman lower")
     axes.set_title(title, fontsize=10)
     axes.set_xlabel("volume fraction" if d == 3 else "area fraction")
     axes.set_ylabel("difference to the third-order model [%]")
