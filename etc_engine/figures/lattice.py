@@ -17,8 +17,11 @@ Series = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 def _plot(axes: Axes, series: Series, lines: str = "-") -> None:
     """One marker and colour for every series; ``lines="none"`` leaves the points alone."""
+    fill = "none" if lines == "none" else "full"
     for (label, (x, y)), colour, marker in zip(series.items(), COLOURS, MARKERS, strict=False):
-        axes.plot(x, y, linestyle=lines, color=colour, marker=marker, markersize=4, linewidth=1.1, label=label)
+        axes.plot(
+            x, y, linestyle=lines, color=colour, marker=marker, markersize=5, linewidth=1.1, fillstyle=fill, label=label
+        )
 
 
 def _finish(axes: Axes, across: str, up: str, legend: bool = True) -> None:

@@ -70,7 +70,9 @@ class _Pairs:
     outer: NDArray[np.bool_]
 
 
-def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box: Box | None = None) -> FittedSeeds:
+def fitted_seeds(
+    composite: Composite, count: int, rng: np.random.Generator, box: Box | None = None, offset: float = OFFSET
+) -> FittedSeeds:
     r"""About `count` seeds whose Laguerre facets follow the surfaces of spherical inclusions.
 
     Pairs of seeds mirror each other in the tangent planes of a sphere, at :math:`a' (1 \pm \delta / a')`; the facet
@@ -91,6 +93,9 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
     rng : numpy.random.Generator
     box : Box, optional
         The box of the lattice, where it has walls that the composite does not; the composite's by default.
+    offset : float
+        Distance of the seeds of a pair from the interface, in seed spacings; 0.15 is best for the conductivity, 0.4,
+        near the middle of the cells, for a transient.
 
     Returns
     -------
@@ -104,8 +109,8 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
 
     Notes
     -----
-    delta is 0.15 seed spacings h, less where the gap to another inclusion is narrow. Pairs on a part of a sphere within
-    another inclusion are left out. Walls cut the inclusions off.
+    delta is the offset times the seed spacing h, less where the gap to another inclusion is narrow. Pairs on a part of
+    a sphere within another inclusion are left out. Walls cut the inclusions off.
 
     Examples
     --------
@@ -128,7 +133,7 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
             f"inclusion {small} of radius {inclusions.radii[small]:.4g} is too small for {count} lattice particles: "
             f"use at least {needed}"
         )
-    pairs = _pairs_on_spheres(inclusions, h, rng)
+    pairs = _pairs_on_spheres(inclusions, h, offset * h, rng)
     bulk = pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.5, spread=0.0).centers
     bulk = bulk[_interface_distance(composite, bulk) > CLEARANCE * h]
     return _tuned(composite, pairs, bulk, h, box)
@@ -144,7 +149,7 @@ def _spacing(composite: Composite, count: int, box: Box) -> float:
     return h
 
 
-def _pairs_on_spheres(inclusions: ParticlePacking, h: float, rng: np.random.Generator) -> _Pairs:
+def _pairs_on_spheres(inclusions: ParticlePacking, h: float, widest: float, rng: np.random.Generator) -> _Pairs:
     """Pairs spread over every sphere, less those within another sphere or beyond a wall."""
     box, centers, radii = inclusions.box, inclusions.centers, inclusions.radii
     numbers = np.maximum(np.round(4.0 * np.pi * radii**2 / (PATCH * h * h)), FEWEST_PAIRS).astype(np.int64)
@@ -157,7 +162,7 @@ def _pairs_on_spheres(inclusions: ParticlePacking, h: float, rng: np.random.Gene
     gap = _gap_to_others(inclusions, sphere, points, 2.0 * h)
     keep = inside_box & (gap > 0.0)
     sphere, normal, gap = sphere[keep], normal[keep], gap[keep]
-    offset = np.minimum(np.minimum(OFFSET * h, 0.5 * radii[sphere]), np.maximum(NARROW * gap, NARROWEST * h))
+    offset = np.minimum(np.minimum(widest, 0.5 * radii[sphere]), np.maximum(NARROW * gap, NARROWEST * h))
     return _Pairs(sphere, normal, offset, gap > NARROWEST * h)
 
 

@@ -69,6 +69,43 @@ def test_the_figure_has_the_numbers_of_the_result(real, finished):
     assert {"maxwell", "hashin_shtrikman_upper"} <= {model["name"] for model in curve["models"]}
 
 
+COMPOSITE = """schema = 1
+name = "composite"
+seed = 271828
+[packing]
+method = "random-sequential"
+radii = "equal"
+box = [1.0, 1.0]
+periodic = "xy"
+count = 9
+density = [0.1, 0.2]
+[conduction]
+engine = "voxel"
+tolerance = 1e-6
+[composite]
+contrast = [2.0, 10.0]
+resolution = 40
+[statistics]
+realizations = 2
+"""
+
+
+def test_a_composite_is_swept_over_contrasts(real):
+    study = client.submit(real.server, COMPOSITE)["id"]
+    ended = client.wait(real.server, study, interval=0.05)
+    assert ended["state"] == "done", ended
+    curve = json.loads(ask(f"{real.url}/api/studies/{study}/curve")[2])
+    statistics = simulated(client.fetch(real.server, study))
+    assert [one["contrast"] for one in curve["series"]] == [2.0, 10.0]
+    for one in curve["series"]:
+        np.testing.assert_array_equal(one["mean"], statistics["conductivity_mean"].sel(contrast=one["contrast"]).values)
+    maxwell = next(model for model in curve["models"] if model["name"] == "maxwell")
+    assert len(maxwell["curves"]) == 2
+    for values, contrast in zip(maxwell["curves"], (2.0, 10.0), strict=True):
+        beta, fraction = (contrast - 1.0) / (contrast + 1.0), curve["solid_fraction"][0]
+        assert values[0] == pytest.approx((1.0 + beta * fraction) / (1.0 - beta * fraction), rel=1e-9)
+
+
 def test_the_report_is_a_page_that_may_run_nothing(real, finished):
     pytest.importorskip("matplotlib")
     status, headers, body = ask(f"{real.url}/api/studies/{finished['id']}/report.html")

@@ -130,6 +130,16 @@ def test_limits_are_met_before_anything_runs():
     assert (apply(adaptive, Limits()).units, apply(adaptive, Limits()).most) == (6, 100)
 
 
+def test_voxels_and_lattices_are_counted_too():
+    composite = STUDY.replace("[packing]", '[packing]\nmethod = "lubachevsky-stillinger"\nperiodic = "xy"')
+    composite = composite.replace("[0.55, 0.60]", "[0.3]").replace("uniform:0.03:0.06", "equal:0.05")
+    composite += '[conduction]\nengine = "voxel"\n[composite]\ncontrast = [2.0, 10.0]\nresolution = {}\n'
+    assert apply(composite.format(64), Limits()).cells == 6
+    with pytest.raises(StudyError, match=r"composite: takes about \d+ MB") as caught:
+        apply(composite.format(10_000), Limits())
+    assert field_of(str(caught.value)) == "composite"
+
+
 def test_expected_particles_are_box_over_particle():
     text = STUDY.replace("uniform:0.03:0.06", "equal:0.1").replace("[1.0, 1.0]", "[2.0, 3.0]")
     assert expected_particles(parse_study(text)) == pytest.approx(6.0 * 0.6 / (np.pi * 0.01), rel=1e-12)
@@ -146,6 +156,7 @@ def test_expected_particles_are_box_over_particle():
         ("study: models: names: there is no model named 'x'; there are: a", "models.names"),
         ("study: conduction: method: found 'x', allowed with dtem: chord", "conduction.method"),
         ("study: contacts: rule = 'bonded' needs contact_angle, a list of half-angles in degrees", "contacts"),
+        ("study: composite.resolution: found 1, allowed: a whole number of at least 4", "composite.resolution"),
         ("study: expected a JSON object, found list", ""),
     ],
 )
