@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tomllib
 
 import numpy as np
@@ -304,6 +305,14 @@ def test_a_refused_batch_fails_with_its_own_words(tmp_path):
         ended = client.wait(service.server, study, interval=0.05)
         assert ended["state"] == "failed"
         assert "is a folder" in ended["reason"]
+
+
+def test_a_batch_that_always_dies_is_given_up_and_says_so(tmp_path):
+    deadly = [sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"]
+    with Service(tmp_path / "data", {"engine": deadly}) as service:
+        ended = client.wait(service.server, client.submit(service.server, STUDY)["id"], interval=0.05)
+        assert (ended["state"], ended["reason"]) == ("failed", "its batch ended with status -9, see the log")
+        assert ended["log"].count("== start") == 3
 
 
 def test_the_client_names_what_is_not_there():

@@ -7,6 +7,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -44,6 +45,13 @@ def test_other_hosts_need_a_token(tmp_path, refused):
     refused("expected one word", *where[:4], ETC_ENGINE_TOKEN="word one two three four")
     refused("brings requests of other machines", "--data", tmp_path / "d", "--allow-host", "etc.example.org")
     assert not (tmp_path / "d").exists()
+
+
+def test_without_the_extra_it_says_what_to_install(refused, tmp_path, monkeypatch):
+    for name in [name for name in sys.modules if name.startswith("etc_engine.service")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "fastapi", None)
+    refused("the service needs fastapi: install the extra with pip install 'etc-engine[service]'", "--data", tmp_path)
 
 
 def test_a_port_in_use(tmp_path, refused):
