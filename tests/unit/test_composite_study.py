@@ -153,12 +153,12 @@ def test_a_broken_bound_is_told(etc_engine, tmp_path):
 
 def test_the_lattice_engine_shares_one_lattice_among_the_contrasts():
     box = Box((1.0, 1.0, 1.0), (True, True, True))
-    packing = replace(SPEC.packing, box=box, count=2, density=0.15)
+    packing = replace(SPEC.packing, box=box, count=4, density=0.15)
     spec = replace(
         SPEC,
         packing=packing,
         conduction=ConductionSpec("lattice", ("laguerre", "contact"), tolerance=1e-8),
-        composite=CompositeSpec(0.5, (1.0, 5.0), nodes=1500),
+        composite=CompositeSpec(0.5, (1.0, 5.0), nodes=600),
     )
     result = realize(spec, np.random.default_rng(74))
     plain, filled = result.cells
@@ -168,7 +168,7 @@ def test_the_lattice_engine_shares_one_lattice_among_the_contrasts():
         np.testing.assert_allclose(np.diag(cell.conductivity), 0.5, rtol=1e-6)
     beta = 4.0 / 7.0  # Maxwell at contrast 5, a lower bound: f = 0.15
     maxwell = 0.5 * (1.0 + 2.0 * 0.15 * beta) / (1.0 - 0.15 * beta)
-    assert np.trace(filled[0].conductivity) / 3 == pytest.approx(maxwell, rel=0.02)
+    assert np.trace(filled[0].conductivity) / 3 == pytest.approx(maxwell, rel=0.03)
     alone = replace(spec, composite=replace(spec.composite, contrasts=(5.0,)))
     again = realize(alone, np.random.default_rng(74)).cells[0][0]
     np.testing.assert_array_equal(again.conductivity, filled[0].conductivity)
