@@ -104,13 +104,14 @@ def fitted_seeds(
     Raises
     ------
     GeometryError
-        If the box is not three-dimensional, an inclusion is too small for the number of seeds, or it ends up without
-        a seed.
+        If the box is not three-dimensional, an inclusion is too small for the number of seeds, or the volume cannot
+        be met.
 
     Notes
     -----
     delta is the offset times the seed spacing h, less where the gap to another inclusion is narrow. Pairs on a part of
-    a sphere within another inclusion are left out. Walls cut the inclusions off.
+    a sphere within another inclusion are left out, and with them inclusions that others cover. Walls cut the
+    inclusions off.
 
     Examples
     --------
@@ -244,10 +245,5 @@ def _tuned(composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: fl
     if abs(error_high) > 100.0 * VOLUME:
         raise GeometryError(
             f"the inclusions could not be fitted to their volume (error {error_high:.1e}): use more lattice particles"
-        )
-    missing = np.setdiff1d(np.arange(composite.inclusions.count), made.owner)
-    if missing.size:
-        raise GeometryError(
-            f"inclusion {missing[0]} holds no lattice particle: use more particles, or remove it if others cover it"
         )
     return made

@@ -39,6 +39,9 @@ DENSE = 0.635
 LOOSER = 0.28
 """... less this part of the volume of a layer one mean radius thick along the walls."""
 
+NOTHING = 1e-9
+"""An effective conductivity below this part of the largest is none."""
+
 FEWEST = 50
 """Particles of a lattice."""
 
@@ -117,7 +120,10 @@ def homogenize_lattice(
             other = conduct(particles)
         scale = float(np.abs(np.diag(fine.result.tensor)).max())
         difference = float(np.abs(np.diag(fine.result.tensor - other.result.tensor)).max())
-        error = difference / scale if scale > 0.0 else 0.0
+        conducts = scale > NOTHING * float(
+            node_conductivities(composite, np.arange(-1, composite.inclusions.count)).max()
+        )
+        error = difference / scale if conducts else 0.0
     return Homogenized(
         tensor=fine.result.tensor,
         volume_fraction=fine.volume_fraction,

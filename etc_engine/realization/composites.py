@@ -40,7 +40,6 @@ def conduct_lattice(packing: ParticlePacking, spec: RealizationSpec, rng: np.ran
             composite,
             rng=np.random.default_rng(seed),
             particles=spec.nodes,
-            boundary="periodic" if all(composite.inclusions.box.periodic) else "walls",
             transmission=method,
             tolerance=tolerance,
         )

@@ -12,7 +12,7 @@ from etc_engine.composite import Composite
 from etc_engine.errors import InputError
 
 # the sphere or disk within half-spaces, which the exact union of a packing is made of
-from etc_engine.packing.structure import NODES, _cut_disk_area, _cut_sphere_volume, _cuts
+from etc_engine.packing.structure import GAUSS_NODES, cut_disk_area, cut_sphere_volume, particle_cuts
 from etc_engine.voxel.conductivity import VoxelConductivity
 from etc_engine.voxel.fractions import ball_in_box
 
@@ -167,10 +167,10 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
 
 def _find_pieces(composite: Composite, shape: tuple[int, ...]) -> _Pieces:
     inclusions = composite.inclusions
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
     angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
     steps = np.asarray(inclusions.box.lengths) / np.asarray(shape)
-    starts, normals, cuts = _cuts(inclusions)
+    starts, normals, cuts = particle_cuts(inclusions)
     owner, count, voxel, inclusion, fraction, normal, central = _walk(
         inclusions.centers,
         inclusions.radii,
@@ -334,5 +334,5 @@ def _share(radius, low, high, normals, cuts, volume, angles, shares):  # type: i
             planes[crossing], distances[crossing] = normals[m], cuts[m]
             crossing += 1
     if d == 2:
-        return min(_cut_disk_area(radius, planes, distances) / volume, 1.0)
-    return min(_cut_sphere_volume(radius, planes, distances, angles, shares) / volume, 1.0)
+        return min(cut_disk_area(radius, planes, distances) / volume, 1.0)
+    return min(cut_sphere_volume(radius, planes, distances, angles, shares) / volume, 1.0)

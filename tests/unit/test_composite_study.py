@@ -149,3 +149,26 @@ def test_a_broken_bound_is_told(etc_engine, tmp_path):
     assert told.returncode == 3
     assert "contrast 10.0: " in told.stderr
     assert "breaks hashin_shtrikman_upper" in told.stderr
+
+
+def test_the_lattice_engine_shares_one_lattice_among_the_contrasts():
+    box = Box((1.0, 1.0, 1.0), (True, True, True))
+    packing = replace(SPEC.packing, box=box, count=4, density=0.15)
+    spec = replace(
+        SPEC,
+        packing=packing,
+        conduction=ConductionSpec("lattice", ("laguerre", "contact"), tolerance=1e-8),
+        composite=CompositeSpec(0.5, (1.0, 5.0), nodes=600),
+    )
+    result = realize(spec, np.random.default_rng(74))
+    plain, filled = result.cells
+    assert {cell.status for row in result.cells for cell in row} == {Status.OK}
+    # no contrast: the matrix, exactly by facets and by the calibrated contacts
+    for cell in plain:
+        np.testing.assert_allclose(np.diag(cell.conductivity), 0.5, rtol=1e-6)
+    beta = 4.0 / 7.0  # Maxwell at contrast 5, a lower bound: f = 0.15
+    maxwell = 0.5 * (1.0 + 2.0 * 0.15 * beta) / (1.0 - 0.15 * beta)
+    assert np.trace(filled[0].conductivity) / 3 == pytest.approx(maxwell, rel=0.03)
+    alone = replace(spec, composite=replace(spec.composite, contrasts=(5.0,)))
+    again = realize(alone, np.random.default_rng(74)).cells[0][0]
+    np.testing.assert_array_equal(again.conductivity, filled[0].conductivity)

@@ -113,6 +113,21 @@ def test_an_infinite_interface_resistance_insulates():
     np.testing.assert_allclose(sealed.tensor, void.tensor, atol=1e-6)
 
 
+def test_what_others_cover_does_not_count():
+    nested = Composite(ParticlePacking(CENTRE * 2, [0.3, 0.15], CUBE), 1.0, [5.0, 1000.0])
+    made = homogenize_lattice(nested, rng=rng(), particles=1000)
+    assert made.volume_fraction == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=2e-6)
+    assert np.diag(made.tensor) == pytest.approx(float(simple_cubic(1.0, 5.0, 0.036 * np.pi)), rel=0.005)
+
+
+@pytest.mark.parametrize("box", [CUBE, Box((1.0, 1.0, 1.0))])
+def test_inclusions_apart_in_an_insulating_matrix_conduct_nothing(box):
+    isolated = Composite(ParticlePacking(CENTRE, [0.3], box), 0.0, 5.0)
+    made = homogenize_lattice(isolated, rng=rng(), particles=600)
+    assert np.abs(np.diag(made.tensor)).max() < 1e-9
+    assert made.relative_error_estimate == 0.0
+
+
 def test_the_contact_lattice_is_calibrated_on_itself():
     made = homogenize_lattice(spheres(CENTRE, 1 / 3, 1.0), rng=rng(), particles=1000, transmission="contact")
     np.testing.assert_allclose(np.diag(made.tensor), 1.0, rtol=1e-9)
