@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from etc_engine.dtem.field import ParticleField, recover_field
     from etc_engine.dtem.interior import temperatures_inside
     from etc_engine.dtem.steady import solve_steady
-    from etc_engine.effective import EffectiveConductivity, effective_conductivity, mean_field_conductivity
+    from etc_engine.effective import effective_conductivity, mean_field_conductivity
     from etc_engine.errors import EtcError
     from etc_engine.lattice.homogenize import homogenize_lattice
     from etc_engine.models.catalogue import evaluate as evaluate_model
@@ -34,13 +34,14 @@ if TYPE_CHECKING:
     from etc_engine.percolation import find_backbone
     from etc_engine.pipe.steady import pipe_conductivity
     from etc_engine.realization import RealizationSpec, realize
+    from etc_engine.tensor import EffectiveConductivity
     from etc_engine.voxel.homogenize import homogenize_voxel
 
 _HOMES = {
     "Box": "box",
     "Composite": "composite",
     "ContactNetwork": "contacts",
-    "EffectiveConductivity": "effective",
+    "EffectiveConductivity": "tensor",
     "EtcError": "errors",
     "PackingSpec": "packing",
     "ParticleField": "dtem.field",
