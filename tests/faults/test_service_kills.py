@@ -90,9 +90,13 @@ def test_a_batch_outlives_its_service_and_is_taken_up_again(service, reference):
     service.end(signal.SIGKILL)
     seen = units(service)
     until(lambda: units(service) > seen)  # it works on
+    for number in before:
+        os.kill(number, signal.SIGSTOP)  # or it may end before the service is back
     service.start()
     assert client.status(service.server, study)["state"] == "running"
     assert set(batches(service)) == before  # the same processes, not others
+    for number in before:
+        os.kill(number, signal.SIGCONT)
     assert same_data(service, study, reference)
     assert units(service) == 24  # none computed twice
 
