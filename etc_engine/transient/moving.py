@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
+from etc_engine.dtem.steady import per_particle
 from etc_engine.errors import InputError
-from etc_engine.packing.particles import ParticlePacking
+from etc_engine.packing.particles import ParticlePacking, particle_values
 from etc_engine.packing.trajectory import Trajectory
 from etc_engine.solvers.marching import march
 from etc_engine.transient.systems import ParticleSystem
@@ -183,8 +184,8 @@ def march_trajectory(
     True
     """
     first = trajectory.packings[0]
-    capacities = first.measures * _of_particles(heat_capacity, first.count, "heat capacity")
-    start = _of_particles(initial, first.count, "initial temperature")
+    capacities = first.measures * per_particle(heat_capacity, first.count, "heat capacity")
+    start = particle_values(initial, first.count, "initial temperature")
     packing, network = _contacts(first, expansion, start, contacts)
     system = build(network, capacities)
     rates = system.heat.rates(trajectory.times[0], system.initial(start))
@@ -249,11 +250,3 @@ def _changes(before: ContactNetwork, after: ContactNetwork) -> tuple[int, int]:
     n = before.packing.count
     old, new = (np.unique(network.pairs[:, 0] * n + network.pairs[:, 1]) for network in (before, after))
     return int(np.setdiff1d(old, new).size), int(np.setdiff1d(new, old).size)
-
-
-def _of_particles(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
-    """One value for all particles, or one for each."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (count,)) or not np.isfinite(array).all():
-        raise InputError(f"the {name} must be one finite number or {count} of them, found shape {array.shape}")
-    return np.broadcast_to(array, (count,)).copy()
