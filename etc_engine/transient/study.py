@@ -223,10 +223,13 @@ class NetworkStudy(_Table):
         """The study with all defaults written out, as plain JSON values."""
         return self.model_dump(mode="json", by_alias=True)
 
+    def identity(self) -> dict[str, Any]:
+        """What decides the numbers: everything but the name."""
+        return {key: value for key, value in self.resolved().items() if key != "name"}
+
     def digest(self) -> str:
-        """SHA-256 of all that decides the numbers: everything but the name."""
-        identity = {key: value for key, value in self.resolved().items() if key != "name"}
-        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+        """SHA-256 of the identity."""
+        return hashlib.sha256(json.dumps(self.identity(), sort_keys=True).encode()).hexdigest()
 
 
 def parse_study(content: Mapping[str, Any]) -> NetworkStudy:

@@ -136,3 +136,11 @@ def test_a_missing_study_and_a_missing_folder(tmp_path):
     command = [str(tmp_path / "study.toml"), "-o", str(tmp_path / "none" / "out.nc")]
     result = CliRunner().invoke(transient_command, command, standalone_mode=False)
     assert isinstance(result.exception, OutputError)
+
+
+def test_the_study_itself_is_no_output(tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(STUDY)
+    result = CliRunner().invoke(transient_command, [str(study), "-o", str(study), "--overwrite"], standalone_mode=False)
+    assert isinstance(result.exception, OutputError) and "the input itself" in str(result.exception)
+    assert study.read_text() == STUDY

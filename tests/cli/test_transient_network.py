@@ -293,3 +293,68 @@ def test_a_state_comes_back_from_disk(tmp_path):
     (again,) = read_states(tmp_path)
     assert again.older.tobytes() == state.older.tobytes()
     assert (again.time, again.step) == (state.time, state.step)
+
+
+DISKS = "x,y,radius\n0.25,0.5,0.25\n0.75,0.5,0.25\n"
+PAIR = """
+schema = 1
+kind = "network"
+name = "two disks"
+particles = "disks.csv"
+box = [1.0, 1.0]
+[contacts]
+rule = "bonded"
+contact_angle = 10.0
+[material]
+heat_capacity = 1.0
+initial = 0.0
+[walls]
+left = { type = "fixed", value = 1.0 }
+[time]
+steps = 2
+times = [0.0, 1.0, 2.0]
+"""
+
+
+@pytest.fixture
+def pair(tmp_path):
+    (tmp_path / "disks.csv").write_text(DISKS)
+    return write(tmp_path, PAIR)
+
+
+@pytest.mark.parametrize("name", ["disks.csv", "study.toml"])
+def test_no_output_replaces_an_input(etc_engine, pair, name):
+    done = etc_engine("transient", pair, "-o", pair.parent / name, "--overwrite")
+    assert done.returncode == 2
+    assert "is the input itself" in done.stderr
+    assert (pair.read_text(), (pair.parent / "disks.csv").read_text()) == (PAIR, DISKS)
+
+
+def test_a_complete_output_is_of_its_study_and_is_drawn_from(etc_engine, pair):
+    output, picture = pair.parent / "out.nc", pair.parent / "out.png"
+    assert etc_engine("transient", pair, "-o", output).returncode == 0
+    before = output.read_bytes()
+    done = etc_engine("transient", pair, "-o", output, "--resume", "--plot", picture)
+    assert done.returncode == 0, done.stderr
+    assert "drawn from it" in done.stderr
+    assert picture.stat().st_size > 10_000
+    pair.write_text(PAIR.replace("steps = 2", "steps = 3"))
+    done = etc_engine("transient", pair, "-o", output, "--resume")
+    assert done.returncode == 2
+    assert "belongs to another study (time.steps is 2 there and 3 here)" in done.stderr
+    assert output.read_bytes() == before
+
+
+def test_frames_of_another_series_are_kept(etc_engine, pair):
+    pytest.importorskip("vtkmodules.vtkIOXML", reason="the extra vtk is not installed")
+    (pair.parent / "late").mkdir()
+    old = [pair.parent / "late" / f"late-{k:05d}.vtp" for k in (0, 7)]
+    for path in old:
+        path.write_text("precious")
+    command = ["transient", pair, "-o", pair.parent / "out.nc", "--vtk", pair.parent / "late.pvd"]
+    done = etc_engine(*command)
+    assert done.returncode == 2
+    assert "holds .vtp files already" in done.stderr
+    assert [path.read_text() for path in old] == ["precious"] * 2
+    assert etc_engine(*command, "--overwrite").returncode == 0
+    assert sorted(path.name for path in (pair.parent / "late").iterdir()) == [f"late-{k:05d}.vtp" for k in range(3)]
