@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from etc_engine.batch.study_tables import ContactsTable, PackingTable
@@ -18,6 +19,8 @@ from etc_engine.walls import Convective, FixedTemperature, HeatFlux, Insulated, 
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+MOST_STEPS = 10**9
+"""A run of more steps than these, at a microsecond each and more, has a slip in its study."""
 
 
 class _Table(BaseModel):
@@ -157,6 +160,23 @@ class Time(_Table):
         return self
 
 
+def refuse_endless(time: Time, times: Sequence[float] | NDArray[np.float64]) -> None:
+    """Refuse steps that no run lives to see.
+
+    Raises
+    ------
+    StudyError
+        If output at these times asks for more than `MOST_STEPS`.
+    """
+    intervals = np.diff(np.asarray(times, dtype=np.float64))
+    if time.scheme == "adaptive":
+        return
+    count = float(intervals.size) * float(time.steps) if time.steps else float((intervals / (time.step or 1.0)).sum())
+    if count > MOST_STEPS:
+        word = "steps" if time.steps else "step"
+        raise StudyError(f"time.{word}: that makes {count:.3g} steps in total, allowed are {MOST_STEPS:.0e}")
+
+
 class Motion(_Table):
     """``[motion]``: all frames of the dump, one after the other, instead of one."""
 
@@ -200,6 +220,10 @@ class NetworkStudy(_Table):
             raise ValueError("time.times: missing, expected the output times; the first one is the start")
         if self.motion is not None:
             self._check_motion(self.motion)
+        try:
+            refuse_endless(self.time, self.time.times)
+        except StudyError as error:
+            raise ValueError(str(error)) from None
         if len(self.contacts.contact_angle or (0.0,)) != 1:
             raise ValueError("contacts.contact_angle: a transient has one half-angle")
         return self

@@ -358,3 +358,23 @@ def test_frames_of_another_series_are_kept(etc_engine, pair):
     assert [path.read_text() for path in old] == ["precious"] * 2
     assert etc_engine(*command, "--overwrite").returncode == 0
     assert sorted(path.name for path in (pair.parent / "late").iterdir()) == [f"late-{k:05d}.vtp" for k in range(3)]
+
+
+@pytest.mark.parametrize("method", ["pipe", "chord", "arc"])
+@pytest.mark.parametrize("coefficient", [1e3, 1e6, 1e15])
+def test_a_firm_convective_wall_keeps_the_digits_of_its_heat(pair, method, coefficient):
+    """It tends to a wall of given temperature; over the film alone its heat would be a difference of equals."""
+    content = tomllib.loads(PAIR) | {"conduction": {"method": method}}
+    wall = {"type": "convective", "coefficient": coefficient, "value": 1.0}
+    soft = run_transient(parse_study(content | {"walls": {"left": wall}}), pair.parent).states[-1]
+    firm = run_transient(parse_study(content), pair.parent).states[-1]
+    assert abs(soft.imbalance) < 1e-13
+    assert soft.heat.sum() == pytest.approx(firm.heat.sum(), rel=10.0 / coefficient, abs=1e-12)
+
+
+@pytest.mark.parametrize("control", ["steps = 1_000_000_000_000", "step = 1e-12"])
+def test_an_endless_run_is_refused(etc_engine, pair, control):
+    pair.write_text(PAIR.replace("steps = 2", control))
+    done = etc_engine("transient", pair, "-o", pair.parent / "out.nc")
+    assert done.returncode == 2
+    assert "2e+12 steps in total, allowed are 1e+09" in done.stderr
