@@ -101,8 +101,18 @@ class Study(StudyTable):
         return Box(lengths, parse_periodic(self.packing.periodic, len(lengths)))
 
     def resolved(self) -> dict[str, Any]:
-        """The study with all defaults written out, as plain JSON values."""
-        return self.model_dump(mode="json", by_alias=True)
+        """The study with all defaults written out, as plain JSON values, less what has no meaning in it.
+
+        It is a study again, the same one.
+        """
+        values = self.model_dump(mode="json", by_alias=True)
+        if self.composite is not None:
+            del values["contacts"]
+            del values["models"]["pore_conductivity"]
+            del values["composite"]["nodes" if self.conduction.engine == "voxel" else "resolution"]
+            if self.composite.contrast is not None:
+                del values["conduction"]["conductivity"]
+        return values
 
     def identity(self) -> dict[str, Any]:
         """What decides the numbers of the result: everything but the name and the models."""
