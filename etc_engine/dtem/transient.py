@@ -127,6 +127,20 @@ def contact_flows(system: TransientSystem, time: float, temperatures: NDArray[np
     return np.asarray(flows[system.elements.nodes < contacts][:: system.elements.modes])
 
 
+def particle_sides(system: TransientSystem, particle: int) -> slice:
+    """Rows of one particle among the sides, and so among the flows of `contact_flows`.
+
+    Raises
+    ------
+    InputError
+        If there is no such particle.
+    """
+    count = system.network.packing.count
+    if not 0 <= particle < count:
+        raise InputError(f"there is no particle {particle}: they are numbered from 0 to {count - 1}")
+    return slice(int(system.sides.offsets[particle]), int(system.sides.offsets[particle + 1]))
+
+
 def transient_system(
     network: ContactNetwork,
     walls: Mapping[str, WallCondition],

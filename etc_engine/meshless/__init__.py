@@ -1,6 +1,7 @@
 """Meshless transient heat conduction: dual reciprocity with Trefftz functions or fundamental solutions."""
 
 from etc_engine.meshless.contact_heating import ContactArc, heat_disk_through_arcs
+from etc_engine.meshless.contact_series import flow_histories, heat_disk_by_flows
 from etc_engine.meshless.diagnostics import DiscretizationWarning
 from etc_engine.meshless.discretization import Discretization
 from etc_engine.meshless.domain import Disk, Polygon
@@ -20,6 +21,8 @@ __all__ = [
     "Polygon",
     "PolyharmonicSpline",
     "ReverseBasis",
+    "flow_histories",
+    "heat_disk_by_flows",
     "heat_disk_through_arcs",
     "solve_transient",
 ]

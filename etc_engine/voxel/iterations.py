@@ -93,9 +93,7 @@ def solve_eyre_milton(
     history = []
     for iteration in range(1, limit + 1):
         image = contrast.apply(tau)
-        change, norm = _reflect(
-            tau.reshape(d, -1), image.reshape(d, -1), project(image).reshape(d, -1), drive
-        )
+        change, norm = _reflect(tau.reshape(d, -1), image.reshape(d, -1), project(image).reshape(d, -1), drive)
         history.append(float(np.sqrt(change / norm)) if norm > 0.0 else 0.0)
         if history[-1] <= tolerance:
             image = contrast.apply(tau)

@@ -201,7 +201,9 @@ def _laminates(
     axes[of[alone]] = _frame(pieces.normal[alone])
     moments = np.zeros((rows.size, d, d))
     np.add.at(
-        moments, of[~alone], weight[~alone, None, None] * pieces.normal[~alone, :, None] * pieces.normal[~alone, None, :]
+        moments,
+        of[~alone],
+        weight[~alone, None, None] * pieces.normal[~alone, :, None] * pieces.normal[~alone, None, :],
     )
     axes[~single] = np.linalg.eigh(moments[~single])[1][:, :, ::-1]
     least = np.full(rows.size, composite.matrix)

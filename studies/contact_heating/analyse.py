@@ -1,0 +1,187 @@
+"""The true temperature inside two disks of a bed that warms up, against what the network models take it for.
+
+``python studies/contact_heating/analyse.py [--output DIRECTORY]`` writes contact_heating.csv and contact_heating.png.
+The heat that each model sends through the contacts of a disk is given to a meshless solution of the inside of that
+disk.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from etc_engine import Box, ContactNetwork, PackingSpec, bonded_contacts, pack, parse_radii
+from etc_engine.dtem.resistance import standard_resistance
+from etc_engine.dtem.sides import contact_sides
+from etc_engine.dtem.transient import contact_flows, particle_sides, transient_system
+from etc_engine.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
+from etc_engine.meshless import ContactArc, heat_disk_by_flows
+from etc_engine.pipe.flows import pipe_contact_flows
+from etc_engine.pipe.transient import pipe_transient
+from etc_engine.solvers.marching import march
+from etc_engine.walls import FixedTemperature
+
+HERE = Path(__file__).parent
+SEED = 2009
+HALF_ANGLE = np.radians(10.0)
+WALLS = {"left": FixedTemperature(1.0)}
+FOURIER = np.geomspace(0.01, 20.0, 34)
+MODELS = ("standard with dipoles", "standard", "pipe, uniform")
+ROWS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 20.0)
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What one model and the truth under its fluxes say of one disk, at `FOURIER`.
+
+    Parameters
+    ----------
+    mean, contacts : ndarray, shape (t,), (t, n) [K]
+        Of the model.
+    true_mean, true_contacts : ndarray, shape (t,), (t, n) [K]
+        Of the disk's inside under the model's heat flows, uniform over each contact.
+    """
+
+    mean: np.ndarray
+    contacts: np.ndarray
+    true_mean: np.ndarray
+    true_contacts: np.ndarray
+
+
+def bed() -> ContactNetwork:
+    """Bonded disks of about the same size, contact half-angle 10 degrees."""
+    spec = PackingSpec("advancing-front", parse_radii("uniform:0.05:0.06"), Box((1.0, 1.0)))
+    return bonded_contacts(pack(spec, np.random.default_rng(SEED)), HALF_ANGLE, 1e-3)
+
+
+def chosen(network: ContactNetwork) -> dict[str, int]:
+    """The disk at the heated wall and the one behind it with the most contacts."""
+    sides = contact_sides(network)
+    number = np.diff(sides.offsets)
+    touching = np.isin(np.arange(number.size), network.wall_particles[network.walls == 0])
+    pairs = np.concatenate([network.pairs, network.pairs[:, ::-1]])
+    behind = np.isin(np.arange(number.size), pairs[touching[pairs[:, 0]], 1]) & ~touching
+    return {
+        "at the wall": int(np.argmax(np.where(touching, number, 0))),
+        "behind it": int(np.argmax(np.where(behind, number, 0))),
+    }
+
+
+def marched(network: ContactNetwork, model: str, unit: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times (m,), heat flows (m, s) and temperatures (m, s) at all contact sides, means (m, n)."""
+    times = np.concatenate([[0.0], np.geomspace(1e-4, FOURIER[-1], 160)]) * unit
+    everything = contact_sides(network)
+    own = standard_resistance(everything.alpha)
+    pipes = model.startswith("pipe")
+    system = (
+        pipe_transient(network, WALLS, resistance="uniform")
+        if pipes
+        else transient_system(network, WALLS, method="standard", dipoles="dipoles" in model)
+    )
+    flows, contacts, means = [], [], []
+    for state in march(system.heat, system.initial(0.0), times, scheme="adaptive", tolerance=1e-6):
+        mean = system.particle_temperatures(state.temperatures)
+        if pipes:
+            walls = system.wall_temperatures(state.time, state.temperatures)
+            flow = pipe_contact_flows(network, everything, mean, walls, resistance="uniform")
+            contact = mean[everything.particles] + own * flow
+        else:
+            flow = contact_flows(system, state.time, state.temperatures)
+            contact = system.contact_temperatures(state.time, state.temperatures)[system.sides.nodes]
+        flows.append(flow)
+        contacts.append(contact)
+        means.append(mean)
+    return times, np.array(flows), np.array(contacts), np.array(means)
+
+
+def inside(network: ContactNetwork, model: str, particle: int, steps: int = 200) -> Inside:
+    """March the network, then the inside of one particle under its fluxes."""
+    radius = float(network.packing.radii[particle])
+    unit = radius**2
+    times, flows, contacts, means = marched(network, model, unit)
+    kept = network if model.startswith("pipe") else network.select(np.ones(network.count, bool), network.walls == 0)
+    sides = contact_sides(kept)
+    system = transient_system(network, WALLS, method="standard")
+    rows = particle_sides(system, particle)
+    if model.startswith("pipe"):
+        rows = slice(int(sides.offsets[particle]), int(sides.offsets[particle + 1]))
+    arcs = [ContactArc(float(t), float(a)) for t, a in zip(sides.theta[rows], sides.alpha[rows], strict=True)]
+    truth = heat_disk_by_flows(arcs, times, flows[:, rows], FOURIER * unit, radius=radius, steps=steps)
+
+    def at_outputs(values: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(np.log(FOURIER * unit), np.log(times[1:]), c[1:]) for c in values.T], axis=-1)
+
+    return Inside(
+        at_outputs(means[:, [particle]])[:, 0],
+        at_outputs(contacts[:, rows]),
+        truth.mean_temperature.values,
+        truth.arc_temperature.values,
+    )
+
+
+def deviations(found: Inside) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Error of the mean, largest error of a contact, largest distance of a contact from the mean; all (t,) [K]."""
+    return (
+        np.abs(found.mean - found.true_mean),
+        np.abs(found.contacts - found.true_contacts).max(axis=1),
+        np.abs(found.true_contacts - found.true_mean[:, None]).max(axis=1),
+    )
+
+
+def draw(path: Path, results: dict[tuple[str, str], Inside]) -> None:
+    """Temperatures by the finest model, and the errors of all models; a row for each disk."""
+    figure = new_figure(10.5, 6.6)
+    grid = figure.subplots(2, 2)
+    for row, place in zip(grid, dict.fromkeys(place for place, _ in results), strict=True):
+        found = results[place, "standard with dipoles"]
+        row[0].plot(FOURIER, found.true_mean, color=INK, linewidth=2.0, label="true mean")
+        for k in range(found.contacts.shape[1]):
+            colour = COLOURS[k % len(COLOURS)]
+            row[0].plot(FOURIER, found.true_contacts[:, k], color=colour, linewidth=1.2, label=f"contact {k + 1}, true")
+            row[0].plot(FOURIER, found.contacts[:, k], "--", color=colour, linewidth=1.0)
+        row[0].set_title(f"disk {place} (dashed: contact by the model)", fontsize=10, loc="left")
+        row[0].set_ylabel("temperature [K]", fontsize=9)
+        row[0].set_xscale("log")
+        for k, model in enumerate(MODELS):
+            mean, contact, _ = deviations(results[place, model])
+            look = {"color": COLOURS[k], "marker": MARKERS[k], "markersize": 3, "linewidth": 1.0}
+            row[1].loglog(FOURIER, contact, label=f"contacts, {model}", **look)
+            row[1].loglog(FOURIER, mean, color=COLOURS[k], linestyle=":", linewidth=1.0)
+        away = deviations(results[place, "standard with dipoles"])[2]
+        row[1].loglog(FOURIER, away, color=INK, linewidth=1.6, label="farthest contact from the true mean")
+        row[1].set_title("largest error of a contact, and (dotted) of the mean", fontsize=10, loc="left")
+        row[1].set_ylabel("error, wall stepped by 1 K [K]", fontsize=9)
+        row[1].set_ylim(1e-5, 2.0)
+        for axes in row:
+            style(axes)
+            axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$", fontsize=9)
+        row[0].legend(fontsize=7.5, frameon=False)
+    grid[0, 1].legend(fontsize=7.5, frameon=False)
+    save(figure, path)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, default=HERE)
+    output = parser.parse_args().output
+    network = bed()
+    results = {
+        (place, model): inside(network, model, particle)
+        for place, particle in chosen(network).items()
+        for model in MODELS
+    }
+    lines = ["disk,fourier,quantity," + ",".join(model.replace(", ", " ") for model in MODELS)]
+    for place in dict.fromkeys(place for place, _ in results):
+        for row in (int(np.argmin(np.abs(np.log(FOURIER / wanted)))) for wanted in ROWS):
+            for k, quantity in enumerate(("mean", "contacts", "farthest contact from the mean")):
+                values = ",".join(f"{deviations(results[place, model])[k][row]:.2e}" for model in MODELS)
+                lines.append(f"{place},{FOURIER[row]:.3g},{quantity},{values}")
+    (output / "contact_heating.csv").write_text("\n".join(lines) + "\n")
+    draw(output / "contact_heating.png", results)
+
+
+if __name__ == "__main__":
+    main()
