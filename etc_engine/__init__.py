@@ -19,23 +19,32 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from etc_engine.box import Box
     from etc_engine.comparison import evaluate_models
+    from etc_engine.composite import Composite
     from etc_engine.contacts import ContactNetwork, bonded_contacts, overlap_contacts
     from etc_engine.dtem.field import ParticleField, recover_field
     from etc_engine.dtem.interior import temperatures_inside
     from etc_engine.dtem.steady import solve_steady
-    from etc_engine.effective import EffectiveConductivity, effective_conductivity, mean_field_conductivity
+    from etc_engine.dtem.transient import transient_system
+    from etc_engine.effective import effective_conductivity, mean_field_conductivity
     from etc_engine.errors import EtcError
+    from etc_engine.lattice.homogenize import homogenize_lattice
     from etc_engine.models.catalogue import evaluate as evaluate_model
     from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii, solid_fraction
     from etc_engine.packing.dumps import read_dump
     from etc_engine.packing.files import read_csv
     from etc_engine.percolation import find_backbone
+    from etc_engine.pipe.steady import pipe_conductivity
+    from etc_engine.pipe.transient import pipe_transient
     from etc_engine.realization import RealizationSpec, realize
+    from etc_engine.solvers.marching import march
+    from etc_engine.tensor import EffectiveConductivity
+    from etc_engine.voxel.homogenize import homogenize_voxel
 
 _HOMES = {
     "Box": "box",
+    "Composite": "composite",
     "ContactNetwork": "contacts",
-    "EffectiveConductivity": "effective",
+    "EffectiveConductivity": "tensor",
     "EtcError": "errors",
     "PackingSpec": "packing",
     "ParticleField": "dtem.field",
@@ -46,10 +55,15 @@ _HOMES = {
     "evaluate_model": "models.catalogue:evaluate",
     "evaluate_models": "comparison",
     "find_backbone": "percolation",
+    "homogenize_lattice": "lattice.homogenize",
+    "homogenize_voxel": "voxel.homogenize",
+    "march": "solvers.marching",
     "mean_field_conductivity": "effective",
     "overlap_contacts": "contacts",
     "pack": "packing",
     "parse_radii": "packing",
+    "pipe_conductivity": "pipe.steady",
+    "pipe_transient": "pipe.transient",
     "read_csv": "packing.files",
     "read_dump": "packing.dumps",
     "realize": "realization",
@@ -57,10 +71,12 @@ _HOMES = {
     "solid_fraction": "packing",
     "solve_steady": "dtem.steady",
     "temperatures_inside": "dtem.interior",
+    "transient_system": "dtem.transient",
 }
 
 __all__ = [
     "Box",
+    "Composite",
     "ContactNetwork",
     "EffectiveConductivity",
     "EtcError",
@@ -73,10 +89,15 @@ __all__ = [
     "evaluate_model",
     "evaluate_models",
     "find_backbone",
+    "homogenize_lattice",
+    "homogenize_voxel",
+    "march",
     "mean_field_conductivity",
     "overlap_contacts",
     "pack",
     "parse_radii",
+    "pipe_conductivity",
+    "pipe_transient",
     "read_csv",
     "read_dump",
     "realize",
@@ -84,6 +105,7 @@ __all__ = [
     "solid_fraction",
     "solve_steady",
     "temperatures_inside",
+    "transient_system",
 ]
 
 

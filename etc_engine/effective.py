@@ -13,48 +13,9 @@ from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.angle_curve import solve_angle_curve
 from etc_engine.dtem.bounds import energy_bounds
 from etc_engine.dtem.steady import SteadySolution, solve_steady
-from etc_engine.percolation import Backbone, asked_groups, find_backbones, load_groups
+from etc_engine.percolation import Backbone, find_backbones, load_groups
 from etc_engine.pipe.conductances import pipe_conductances
-from etc_engine.pipe.steady import check_balance
-
-
-@dataclass(frozen=True, eq=False)
-class EffectiveConductivity:
-    """Effective conductivity of one packing.
-
-    Parameters
-    ----------
-    tensor : ndarray, shape (d, d) [W/(m K)]
-        Symmetric for a periodic box; components that walls leave undefined, or that were not asked for, are NaN.
-    spans : tuple of bool or None
-        For each axis, whether some cluster of contacts spans it; None if it was not asked for.
-    solutions : tuple of SteadySolution
-        The solutions behind it.
-    """
-
-    tensor: NDArray[np.float64]
-    spans: tuple[bool | None, ...]
-    solutions: tuple[SteadySolution, ...]
-
-    @property
-    def unknowns(self) -> int:
-        """Largest number of unknowns of a solve, dead ends taken out."""
-        return max((r.unknowns for s in self.solutions for r in s.reports), default=0)
-
-    @property
-    def iterations(self) -> int:
-        """Largest number of iterations of a solve."""
-        return max((r.iterations for s in self.solutions for r in s.reports), default=0)
-
-    @property
-    def relative_energy_error(self) -> float:
-        """Largest relative error of the conductivity estimated by a solve."""
-        return max((r.relative_energy_error for s in self.solutions for r in s.reports), default=0.0)
-
-    @property
-    def missing_axes(self) -> str:
-        """Axes that no path of contacts spans, as a word."""
-        return "".join(AXES[axis] for axis, flag in enumerate(self.spans) if flag is False)
+from etc_engine.tensor import EffectiveConductivity, assemble_tensor
 
 
 def effective_conductivity(
@@ -67,7 +28,7 @@ def effective_conductivity(
     modes: int | None = None,
     axes: tuple[int, ...] | None = None,
     backbones: Mapping[tuple[int, ...], Backbone] | None = None,
-) -> EffectiveConductivity:
+) -> EffectiveConductivity[SteadySolution]:
     """Effective conductivity by the discrete thermal element method.
 
     Walls: k_aa = Q L_a / (S_a dT). Periodic: k_ab = (1/area) sum_p t_pa . K_p t_pb.
@@ -103,11 +64,9 @@ def effective_conductivity(
     """
     box = network.packing.box
     backbones = backbones or find_backbones(network, axes)
-    tensor = np.full((box.dimension, box.dimension), np.nan)
-    spans: list[bool | None] = [None] * box.dimension
-    solutions = []
-    for group in asked_groups(box, axes):
-        solution = solve_steady(
+
+    def solve(group: tuple[int, ...]) -> SteadySolution:
+        return solve_steady(
             network,
             group,
             method=method,
@@ -117,17 +76,8 @@ def effective_conductivity(
             modes=modes,
             backbone=backbones[group],
         )
-        for axis, flag in zip(group, solution.backbone.spans, strict=True):
-            spans[axis] = flag
-        if box.periodic[group[0]]:
-            spanned = np.outer(solution.backbone.spans, solution.backbone.spans)
-            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume * spanned
-        else:
-            axis = group[0]
-            check_balance(*wall_heat_flows(solution), float(solution.energies[0, 0]))
-            tensor[axis, axis] = solution.energies[0, 0] * box.lengths[axis] / box.cross_section(axis)
-        solutions.append(solution)
-    return EffectiveConductivity(tensor, tuple(spans), tuple(solutions))
+
+    return assemble_tensor(box, axes, solve, wall_heat_flows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +207,7 @@ def _join(points: Sequence[CurvePoint]) -> CurvePoint:
     )
 
 
-def conductivity_bounds(result: EffectiveConductivity) -> NDArray[np.float64]:
+def conductivity_bounds(result: EffectiveConductivity[SteadySolution]) -> NDArray[np.float64]:
     """Two-sided bounds of the diagonal of the conductivity tensor, by method ``exact``.
 
     Parameters

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError, model_validator
@@ -225,8 +225,15 @@ def _field(location: Sequence[int | str]) -> tuple[str, type[BaseModel], str]:
         if field is None:  # an unknown key
             break
         allowed = field.description or allowed
-        if not (isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)):
+        inner = _table_in(field.annotation)
+        if inner is None:
             break
-        table = field.annotation
+        table = inner
     places = [f"[{step}]" for step in location[len(words) :] if isinstance(step, int)]
     return ".".join(words) + "".join(places), table, allowed
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    """The table that a field holds, or may hold."""
+    kinds = get_args(annotation) or (annotation,)
+    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)

@@ -21,6 +21,7 @@ from etc_engine.errors import EtcError
 COMMANDS = {
     "pack": "etc_engine.cli.pack:pack_command",
     "solve": "etc_engine.cli.solve:solve_command",
+    "homogenize": "etc_engine.cli.homogenize:homogenize_command",
     "sweep": "etc_engine.cli.sweep:sweep_command",
     "compare": "etc_engine.cli.compare:compare_command",
     "report": "etc_engine.cli.report:report_command",

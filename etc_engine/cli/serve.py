@@ -50,6 +50,7 @@ def serve_command(
         raise InputError(
             f"the service needs {error.name}: install the extra with pip install 'etc-engine[service]'"
         ) from None
+    from etc_engine.service.launchers import find_mpiexec
     from etc_engine.service.settings import Limits, Settings
     from etc_engine.service.token import read_token
 
@@ -68,7 +69,17 @@ def serve_command(
         launcher="slurm" if launcher == "slurm" else "local",
         token=read_token(token_file),
         hosts=tuple(name.lower() for name in hosts),
-        sbatch=tuple(shlex.split(sbatch)),
+        sbatch=_words(sbatch),
         limits=limits,
     )
+    if settings.launcher == "local" and ranks > 1 and find_mpiexec() is None:
+        click.echo("etc-engine: no mpiexec is found: studies run on one process (extra 'mpi')", err=True)
     serve(settings, lambda address: click.echo(f"etc-engine: serving {data} on {address}", err=True))
+
+
+def _words(text: str) -> tuple[str, ...]:
+    """The words of an option that holds options."""
+    try:
+        return tuple(shlex.split(text))
+    except ValueError as error:
+        raise InputError(f"--sbatch {text!r}: {error}") from None

@@ -7,7 +7,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -16,9 +16,12 @@ if TYPE_CHECKING:
 
     from etc_engine.contacts import ContactNetwork
     from etc_engine.dtem.field import ParticleField
-    from etc_engine.effective import EffectiveConductivity
+    from etc_engine.dtem.steady import SteadySolution
     from etc_engine.packing.files import ParticleTable
-    from etc_engine.pipe.steady import PipeConductivity
+    from etc_engine.pipe.steady import PipeSolution
+    from etc_engine.tensor import EffectiveConductivity
+
+    Result = EffectiveConductivity[SteadySolution] | EffectiveConductivity[PipeSolution]
 
 
 BOND_GAP = 1e-6
@@ -79,7 +82,6 @@ def solve_command(
     from etc_engine.cli.options import print_json
     from etc_engine.contacts import bonded_contacts, overlap_contacts
     from etc_engine.errors import InputError
-    from etc_engine.pipe.steady import PipeConductivity
 
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
@@ -107,8 +109,7 @@ def solve_command(
     )
     result, field = asked.solve(network)
     record = _record(network, asked, result, field)
-    if not isinstance(result, PipeConductivity):
-        _warn_of_close_arcs(method, result)
+    _warn_of_close_arcs(method, result.solutions[0])
     _warn_of_missing_contacts(network, contact_angle, bond_gap)
     _write(outputs, result, field, record)
     record["seconds"] = time.perf_counter() - start
@@ -129,7 +130,7 @@ class _Asked:
     conductivity: ArrayLike
     contact_resistance: float
 
-    def solve(self, network: ContactNetwork) -> tuple[EffectiveConductivity | PipeConductivity, ParticleField]:
+    def solve(self, network: ContactNetwork) -> tuple[Result, ParticleField]:
         """Conductivity, and the field of the load along x."""
         axes = (0, 1) if all(self.periodic) else (0,)
         if self.method == "pipe":
@@ -202,7 +203,7 @@ class _Outputs:
 
 def _write(
     outputs: _Outputs,
-    result: EffectiveConductivity | PipeConductivity,
+    result: Result,
     field: ParticleField,
     record: dict[str, Any],
 ) -> None:
@@ -238,11 +239,14 @@ def _write(
             save_field(files.enter_context(replacing(outputs.plot)), solution, field, caption)
 
 
-def _warn_of_close_arcs(method: str, result: EffectiveConductivity) -> None:
+def _warn_of_close_arcs(method: str, solution: SteadySolution | PipeSolution) -> None:
     from etc_engine.dtem.sides import count_close_arcs
+    from etc_engine.pipe.steady import PipeSolution
 
-    close = count_close_arcs(result.solutions[0].sides)
-    if method != "exact" and close:
+    if method == "exact" or isinstance(solution, PipeSolution):
+        return
+    close = count_close_arcs(solution.sides)
+    if close:
         click.echo(
             f"etc-engine: warning: between {close} pairs of contact arcs of one particle the gap is less than the sum "
             f"of their half-angles; {method} loses accuracy there, method exact does not",
@@ -273,26 +277,27 @@ def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | No
 def _record(
     network: ContactNetwork,
     asked: _Asked,
-    result: EffectiveConductivity | PipeConductivity,
+    result: Result,
     field: ParticleField,
 ) -> dict[str, Any]:
     from etc_engine.dtem.model_error import chord_error_estimate
     from etc_engine.effective import conductivity_bounds
-    from etc_engine.pipe.steady import PipeConductivity
+    from etc_engine.pipe.steady import PipeSolution
     from etc_engine.realization import Status
 
     percolates = bool(result.spans[0])
     record: dict[str, Any] = {"method": asked.method, "conductivity": float(result.tensor[0, 0])}
     if all(network.packing.box.periodic):
         record["conductivity_tensor"] = result.tensor
-    if isinstance(result, PipeConductivity):
+    solution = result.solutions[0]
+    if isinstance(solution, PipeSolution):
         record["pipe_resistance"] = asked.pipe_resistance
     elif asked.method == "exact":
-        bounds = conductivity_bounds(result)[0]
+        bounds = conductivity_bounds(cast("EffectiveConductivity[SteadySolution]", result))[0]
         record["conductivity_bounds"] = bounds
         record["model_error_estimate"] = float(bounds[1] / bounds[0] - 1.0) if percolates else 0.0
     elif asked.method == "chord":
-        record["model_error_estimate"] = chord_error_estimate(result.solutions[0])
+        record["model_error_estimate"] = chord_error_estimate(solution)
     return record | {
         "particles": network.packing.count,
         "contacts": network.count,

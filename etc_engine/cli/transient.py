@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from etc_engine.errors import InputError, OutputError, StudyError
-
-if TYPE_CHECKING:
-    import xarray
 
 EXIT_RESUMABLE = 75
 
@@ -55,13 +50,15 @@ def transient_command(
 
 
 def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
+    from etc_engine.cli.options import replacing
     from etc_engine.meshless.study import run_study
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
             raise InputError(f"{name} goes with studies of kind 'network', this one is of kind 'meshless'")
     result = run_study(content)
-    write_dataset(result.assign_attrs(study_file=wanted.text), wanted.output)
+    with replacing(wanted.output) as file:
+        result.assign_attrs(study_file=wanted.text).to_netcdf(file)
     click.echo(f"{wanted.output}: {dict(result.sizes)}", err=True)
     return 0
 
@@ -98,7 +95,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         raise
     if done.stopped:
         click.echo(
-            f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {len(study.time.times)} states are "
+            f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {done.times.size} states are "
             f"kept, go on with --resume",
             err=True,
         )
@@ -110,8 +107,9 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         with replacing(wanted.plot) as file:
             save_transient(series, file)
     if wanted.vtk is not None:
-        write_vtk_series(wanted.vtk, done.network.packing, series)
-    write_dataset(series, wanted.output)
+        write_vtk_series(wanted.vtk, series)
+    with replacing(wanted.output) as file:
+        series.to_netcdf(file)
     remove_states(wanted.output)
     last = done.states[-1]
     click.echo(
@@ -148,24 +146,3 @@ def read_study(path: Path) -> tuple[dict[str, Any], str]:
     if content.get("kind") not in KINDS:
         raise StudyError(f"{path}: kind = {content.get('kind')!r} is unknown: expected one of {', '.join(KINDS)}")
     return content, text
-
-
-def write_dataset(result: xarray.Dataset, output: Path) -> None:
-    """Write to a temporary file beside the output, then rename: a file is there whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If the folder does not let itself be written to.
-    """
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{output.name}.", suffix=".tmp", dir=output.parent)
-        os.close(handle)
-        temporary = Path(name)
-        try:
-            result.to_netcdf(temporary)
-            temporary.replace(output)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"{output} cannot be written: {error}") from error

@@ -26,6 +26,7 @@ from etc_engine.dtem.steady import make_material, per_particle
 from etc_engine.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
 from etc_engine.dtem.wall_nodes import WallNodes, number_nodes
 from etc_engine.errors import InputError
+from etc_engine.packing.particles import particle_values
 from etc_engine.solvers.marching import HeatSystem
 from etc_engine.walls import Insulated, WallCondition, wall_conditions
 
@@ -71,13 +72,8 @@ class TransientSystem:
             If they are not finite or not as many as the particles.
         """
         centers = self.network.packing.centers
-        given = np.asarray(temperatures(centers) if callable(temperatures) else temperatures, dtype=np.float64)
-        if given.shape not in ((), (centers.shape[0],)) or not np.isfinite(given).all():
-            raise InputError(
-                f"the initial temperature must be one finite number or {centers.shape[0]} of them, found "
-                f"shape {given.shape}"
-            )
-        particles = np.broadcast_to(given, centers.shape[:1])
+        given = temperatures(centers) if callable(temperatures) else temperatures
+        particles = particle_values(given, centers.shape[0], "initial temperature")
         start = np.full(self.heat.capacity.size, particles.mean())
         start[start.size - self.states * particles.size :] = np.repeat(particles, self.states)
         return start
@@ -240,10 +236,7 @@ def _source(source: Source, count: int, states: int) -> Callable[[float], NDArra
     """Heat set free in each state [W/m]."""
 
     def spread(values: ArrayLike) -> NDArray[np.float64]:
-        array = np.asarray(values, dtype=np.float64)
-        if array.shape not in ((), (count,)) or not np.isfinite(array).all():
-            raise InputError(f"the source must be one finite number or {count} of them, found shape {array.shape}")
-        return np.repeat(np.broadcast_to(array, (count,)) / states, states)
+        return np.repeat(particle_values(values, count, "source") / states, states)
 
     if callable(source):
         return lambda t: spread(source(t))

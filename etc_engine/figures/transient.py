@@ -89,12 +89,12 @@ def pick_times(means: np.ndarray, count: int) -> list[int]:
 def _draw_packings(figure: Any, series: xarray.Dataset, shown: list[int]) -> None:
     """Particles at some times, all in one scale of temperatures."""
     width, height = series.attrs["box"]
-    radii = series["radius"].values
-    centers = np.stack([series["x"].values, series["y"].values], axis=1)
     temperature = series["temperature"].values
     low, high = float(temperature.min()), float(temperature.max())
     panels = figure.subplots(1, len(shown), squeeze=False)[0]
     for axes, k in zip(panels, shown, strict=True):
+        place = series.isel(time=k)[["x", "y", "radius"]]
+        radii, centers = place["radius"].values, np.stack([place["x"].values, place["y"].values], axis=1)
         disks = EllipseCollection(
             2 * radii,
             2 * radii,

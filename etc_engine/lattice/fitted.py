@@ -40,7 +40,7 @@ SMALLEST = 0.4
 WEIGHT = 0.01
 """Radius of all seeds, in seed spacings: equal weights."""
 
-VOLUME = 1e-8
+VOLUME = 1e-6
 """Relative error of the volume of the inclusions that is left by their tuning."""
 
 
@@ -70,7 +70,9 @@ class _Pairs:
     outer: NDArray[np.bool_]
 
 
-def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box: Box | None = None) -> FittedSeeds:
+def fitted_seeds(
+    composite: Composite, count: int, rng: np.random.Generator, box: Box | None = None, offset: float = OFFSET
+) -> FittedSeeds:
     r"""About `count` seeds whose Laguerre facets follow the surfaces of spherical inclusions.
 
     Pairs of seeds mirror each other in the tangent planes of a sphere, at :math:`a' (1 \pm \delta / a')`; the facet
@@ -86,10 +88,14 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
     composite : Composite
         Spheres in a matrix.
     count : int
-        Number of seeds wanted, met within some per cent.
+        Number of seeds wanted; met within some per cent, but where spheres have less than a few seeds across, their
+        surfaces take more.
     rng : numpy.random.Generator
     box : Box, optional
         The box of the lattice, where it has walls that the composite does not; the composite's by default.
+    offset : float
+        Distance of the seeds of a pair from the interface, in seed spacings; 0.15 is best for the conductivity, 0.4,
+        near the middle of the cells, for a transient.
 
     Returns
     -------
@@ -98,13 +104,14 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
     Raises
     ------
     GeometryError
-        If the box is not three-dimensional, an inclusion is too small for the number of seeds, or it ends up without
-        a seed.
+        If the box is not three-dimensional, an inclusion is too small for the number of seeds, or the volume cannot
+        be met.
 
     Notes
     -----
-    delta is 0.15 seed spacings h, less where the gap to another inclusion is narrow. Pairs on a part of a sphere within
-    another inclusion are left out. Walls cut the inclusions off.
+    delta is the offset times the seed spacing h, less where the gap to another inclusion is narrow. Pairs on a part of
+    a sphere within another inclusion are left out, and with them inclusions that others cover. Walls cut the
+    inclusions off.
 
     Examples
     --------
@@ -112,7 +119,7 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
     >>> composite = Composite(sphere, 1.0, 5.0)
     >>> seeds = fitted_seeds(composite, 300, np.random.default_rng(4))
     >>> inside = laguerre_facets(seeds.packing).volumes[seeds.owner == 0].sum()
-    >>> bool(abs(inside / composite.volume_fraction - 1.0) < 1e-7)
+    >>> bool(abs(inside / composite.volume_fraction - 1.0) < 1e-6)
     True
     """
     inclusions = composite.inclusions
@@ -127,7 +134,7 @@ def fitted_seeds(composite: Composite, count: int, rng: np.random.Generator, box
             f"inclusion {small} of radius {inclusions.radii[small]:.4g} is too small for {count} lattice particles: "
             f"use at least {needed}"
         )
-    pairs = _pairs_on_spheres(inclusions, h, rng)
+    pairs = _pairs_on_spheres(inclusions, h, offset * h, rng)
     bulk = pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.5, spread=0.0).centers
     bulk = bulk[_interface_distance(composite, bulk) > CLEARANCE * h]
     return _tuned(composite, pairs, bulk, h, box)
@@ -143,7 +150,7 @@ def _spacing(composite: Composite, count: int, box: Box) -> float:
     return h
 
 
-def _pairs_on_spheres(inclusions: ParticlePacking, h: float, rng: np.random.Generator) -> _Pairs:
+def _pairs_on_spheres(inclusions: ParticlePacking, h: float, widest: float, rng: np.random.Generator) -> _Pairs:
     """Pairs spread over every sphere, less those within another sphere or beyond a wall."""
     box, centers, radii = inclusions.box, inclusions.centers, inclusions.radii
     numbers = np.maximum(np.round(4.0 * np.pi * radii**2 / (PATCH * h * h)), FEWEST_PAIRS).astype(np.int64)
@@ -156,7 +163,7 @@ def _pairs_on_spheres(inclusions: ParticlePacking, h: float, rng: np.random.Gene
     gap = _gap_to_others(inclusions, sphere, points, 2.0 * h)
     keep = inside_box & (gap > 0.0)
     sphere, normal, gap = sphere[keep], normal[keep], gap[keep]
-    offset = np.minimum(np.minimum(OFFSET * h, 0.5 * radii[sphere]), np.maximum(NARROW * gap, NARROWEST * h))
+    offset = np.minimum(np.minimum(widest, 0.5 * radii[sphere]), np.maximum(NARROW * gap, NARROWEST * h))
     return _Pairs(sphere, normal, offset, gap > NARROWEST * h)
 
 
@@ -235,13 +242,8 @@ def _tuned(composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: fl
         if abs(error_high) < VOLUME or error_high == error_low:
             break
         low, high, error_low = high, high - error_high * (high - low) / (error_high - error_low), error_high
-    if abs(error_high) > 1e3 * VOLUME:
+    if abs(error_high) > 100.0 * VOLUME:
         raise GeometryError(
             f"the inclusions could not be fitted to their volume (error {error_high:.1e}): use more lattice particles"
-        )
-    missing = np.setdiff1d(np.arange(composite.inclusions.count), made.owner)
-    if missing.size:
-        raise GeometryError(
-            f"inclusion {missing[0]} holds no lattice particle: use more particles, or remove it if others cover it"
         )
     return made

@@ -173,7 +173,7 @@ def probe(
     k = np.broadcast_to(np.asarray(conductivity, dtype=np.float64), (lattice.count,))
     centers, points = lattice.packing.centers, np.asarray(points, dtype=np.float64)
     local = flux_moments(field) / lattice.volumes[:, None]
-    near = cKDTree(centers).query(points, min(nodes, lattice.count))[1]
+    near = np.reshape(cKDTree(centers).query(points, min(nodes, lattice.count))[1], (len(points), -1))
     temperatures, fluxes = np.empty(len(points)), np.empty((len(points), 3))
     for row, (point, found) in enumerate(zip(points, near, strict=True)):
         nearest = found[0]

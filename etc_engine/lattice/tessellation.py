@@ -85,7 +85,8 @@ def laguerre_facets(packing: ParticlePacking) -> LaguerreFacets:
     Notes
     -----
     A facet is part of the radical plane of two spheres and normal to their branch vector; between spheres that do not
-    overlap it separates them. Cost and memory are linear in the number of spheres (about 20 microseconds each).
+    overlap it separates them. Cost and memory are linear in the number of spheres (about 15 microseconds and 2 kB
+    each); much larger spheres among small ones make every search as wide as they are.
     A seed deep inside another sphere may own no cell.
 
     References

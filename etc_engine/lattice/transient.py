@@ -126,7 +126,7 @@ def safe_step(lattice: Lattice, system: HeatSystem) -> float:
 
     Notes
     -----
-    Limits from mean radii (Haddad et al. 2021, eqs. 15, 16) are not safe on polydisperse packings.
+    A limit from the mean radius (Haddad et al. 2021, eq. 15) is twice the critical step of a polydisperse packing.
     """
     if lattice.count != system.capacity.size:
         raise InputError(f"the system has {system.capacity.size} nodes, the lattice {lattice.count}")

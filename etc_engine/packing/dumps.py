@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -76,7 +77,7 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
     Returns
     -------
     Trajectory
-        Its times start at 0.
+        Its times start at 0; the conductivities are those of the first frame.
 
     Raises
     ------
@@ -92,6 +93,7 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
     if not (np.isfinite(timestep) and timestep > 0.0):
         raise InputError(f"the time step of a dump must be positive, found {timestep:g}")
     steps, packings = [], []
+    conductivity: NDArray[np.float64] | None = None
     ids: NDArray[np.int64] | None = None
     for number, frame in enumerate(_frames(path)):
         table = _particles(path, frame)
@@ -101,12 +103,14 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
             odd = np.setxor1d(ids, table.ids)
             what = f"particle {odd[0]} is not in both" if odd.size else "ids repeat"
             raise InputError(f"{path}: frame {number} does not hold the particles of frame 0 ({what}): all must stay")
+        if ids is None:
+            conductivity = table.conductivity
         ids = table.ids
         steps.append(frame.timestep)
         packings.append(table.packing)
     assert ids is not None
     times = timestep * (np.array(steps, dtype=np.float64) - steps[0])
-    return Trajectory(times, tuple(packings), ids)
+    return Trajectory(times, tuple(packings), ids, conductivity)
 
 
 def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> None:
@@ -141,7 +145,7 @@ def write_trajectory(path: Path | str, trajectory: Trajectory, timestep: float =
         raise InputError(f"a time step of {timestep:g} s puts two frames on one step: write with a smaller one")
     with Path(path).open("w", encoding="utf-8", newline="\n") as file:
         for step, packing in zip(steps.tolist(), trajectory.packings, strict=True):
-            _write_frame(file, ParticleTable(packing, ids=trajectory.ids), step)
+            _write_frame(file, ParticleTable(packing, trajectory.conductivity, trajectory.ids), step)
 
 
 def _write_frame(file: TextIO, table: ParticleTable, timestep: int) -> None:
@@ -214,11 +218,15 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
         raise InputError(f"{path}: the frame at step {frame.timestep} holds no particles")
     if "xy" in frame.box_header:
         raise InputError(f"{path} has a triclinic box; only boxes with right angles are understood")
-    bounds = np.array([[float(word) for word in line.split()[:2]] for line in frame.box_lines])
+    bounds = _bounds(path, frame)
     try:
-        values = np.loadtxt(io.StringIO("\n".join(frame.atoms)), ndmin=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an empty table is refused below, in our words
+            values = np.loadtxt(io.StringIO("\n".join(frame.atoms)), ndmin=2)
     except ValueError as error:
         raise InputError(f"{path}: the frame at step {frame.timestep} is not a table of numbers: {error}") from None
+    if len(values) != len(frame.atoms):
+        raise InputError(f"{path}: the frame at step {frame.timestep} has {len(frame.atoms) - len(values)} empty lines")
     if values.shape[1] != len(frame.columns):
         raise InputError(f"{path}: {len(frame.columns)} columns are named, {values.shape[1]} found")
     columns = dict(zip(frame.columns, values.T, strict=True))
@@ -239,6 +247,19 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
     )
     centers = np.stack(positions[:dimension], axis=1) - bounds[:dimension, 0]
     return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"), ids)
+
+
+def _bounds(path: Path, frame: _Frame) -> NDArray[np.float64]:
+    """Lower and upper bound of the box along each axis, shape (3, 2)."""
+    try:
+        bounds = np.array([[float(word) for word in line.split()[:2]] for line in frame.box_lines])
+        valid = bounds.shape == (3, 2) and bool(np.isfinite(bounds).all()) and len(frame.box_header) in (0, 3)
+    except ValueError:
+        valid = False
+    if not valid:
+        found = "; ".join(line.strip() for line in frame.box_lines)
+        raise InputError(f"{path}: the box at step {frame.timestep} needs two numbers an axis, found {found[:80]!r}")
+    return bounds
 
 
 def _is_flat(heights: NDArray[np.float64], radii: NDArray[np.float64]) -> bool:

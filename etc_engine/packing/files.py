@@ -102,6 +102,14 @@ def _header(path: Path, dimension: int) -> list[str]:
 
 def _first_bad_row(path: Path, names: list[str]) -> str:
     """What is wrong with a table that could not be read, as one line."""
+    try:
+        return _find_bad_row(path, names) or f"{path} cannot be read as a table of numbers"
+    except (UnicodeDecodeError, csv.Error) as error:
+        return f"{path} cannot be read as a CSV file: {error}"
+
+
+def _find_bad_row(path: Path, names: list[str]) -> str:
+    """What is wrong with the first bad row; empty if there is none."""
     with path.open(encoding="utf-8-sig", newline="") as file:
         rows = csv.reader(file)
         next(rows)
@@ -114,4 +122,4 @@ def _first_bad_row(path: Path, names: list[str]) -> str:
                     float(word)
                 except ValueError:
                     return f"{where}: {name} is not a number: {word!r}"
-    return f"{path} cannot be read as a table of numbers"
+    return ""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.box import Box
-from etc_engine.errors import GeometryError
+from etc_engine.errors import GeometryError, InputError
 
 
 def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -94,6 +94,20 @@ class ParticlePacking:
     def with_radii(self, radii: NDArray[np.float64]) -> ParticlePacking:
         """The same centres with other radii."""
         return ParticlePacking(self.centers, radii, self.box)
+
+
+def particle_values(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
+    """One value for all particles, or one for each, as an array of its own of shape (count,).
+
+    Raises
+    ------
+    InputError
+        If they are not as many, or not finite.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (count,)) or not np.isfinite(array).all():
+        raise InputError(f"the {name} must be one finite number or {count} of them, found shape {array.shape}")
+    return np.broadcast_to(array, (count,)).copy()
 
 
 def _refuse_first(bad: NDArray[np.bool_] | np.bool_, what: str, values: NDArray[np.float64]) -> None:

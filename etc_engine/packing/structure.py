@@ -10,7 +10,7 @@ from etc_engine.errors import InputError
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 
-NODES = 40
+GAUSS_NODES = 40
 """Gauss points between two heights where the free part of a sphere is not smooth."""
 
 
@@ -49,7 +49,7 @@ def union_area(packing: ParticlePacking) -> float:
     """
     if packing.dimension != 2:
         raise InputError(f"union_area is for disks in a 2D box, found {packing.dimension}D: use union_volume")
-    return float(_sum_of_cut_disks(packing.radii, *_cuts(packing)))
+    return float(_sum_of_cut_disks(packing.radii, *particle_cuts(packing)))
 
 
 def union_volume(packing: ParticlePacking) -> float:
@@ -86,9 +86,9 @@ def union_volume(packing: ParticlePacking) -> float:
     """
     if packing.dimension != 3:
         raise InputError(f"union_volume is for spheres in a 3D box, found {packing.dimension}D: use union_area")
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
     angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
-    return float(_sum_of_cut_spheres(packing.radii, *_cuts(packing), angles, shares))
+    return float(_sum_of_cut_spheres(packing.radii, *particle_cuts(packing), angles, shares))
 
 
 def solid_fraction(packing: ParticlePacking) -> float:
@@ -97,8 +97,22 @@ def solid_fraction(packing: ParticlePacking) -> float:
     return union / packing.box.volume
 
 
-def _cuts(packing: ParticlePacking) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Half-spaces ``normal . p <= cut`` about each centre: where each particle's start, normals, cuts."""
+def particle_cuts(packing: ParticlePacking) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Half-spaces ``normal . p <= cut`` about the centres: the walls, and the radical planes of overlapping particles.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+
+    Returns
+    -------
+    starts : ndarray of int, shape (n + 1,)
+        Rows ``starts[i]:starts[i + 1]`` are those of particle i.
+    normals : ndarray, shape (m, d)
+        Outward unit normals.
+    cuts : ndarray, shape (m,) [m]
+        Signed distances from the particle's centre.
+    """
     lengths = np.asarray(packing.box.lengths)
     touching = neighbor_pairs(packing)
     i, j = touching.pairs.T
@@ -142,7 +156,7 @@ def _wall_cuts(packing: ParticlePacking):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _cut_disk_area(radius, normals, cuts):  # type: ignore[no-untyped-def]
+def cut_disk_area(radius, normals, cuts):  # type: ignore[no-untyped-def]
     """Area of a disk within the half planes ``normal . p <= cut`` about its centre."""
     for m in range(cuts.size):
         if cuts[m] <= -radius:
@@ -192,7 +206,7 @@ def _cut_disk_area(radius, normals, cuts):  # type: ignore[no-untyped-def]
 def _sum_of_cut_disks(radii, starts, normals, cuts):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(radii.size):
-        total += _cut_disk_area(radii[i], normals[starts[i] : starts[i + 1]], cuts[starts[i] : starts[i + 1]])
+        total += cut_disk_area(radii[i], normals[starts[i] : starts[i + 1]], cuts[starts[i] : starts[i + 1]])
     return total
 
 
@@ -220,7 +234,7 @@ def _face_area(radius, normals, cuts, k):  # type: ignore[no-untyped-def]
         flat_normals[count, 0], flat_normals[count, 1] = x / slope, y / slope
         flat_cuts[count] = room / slope
         count += 1
-    return _cut_disk_area(np.sqrt((radius - cuts[k]) * (radius + cuts[k])), flat_normals[:count], flat_cuts[:count])
+    return cut_disk_area(np.sqrt((radius - cuts[k]) * (radius + cuts[k])), flat_normals[:count], flat_cuts[:count])
 
 
 @njit(cache=True)
@@ -280,7 +294,7 @@ def _free_angle(radius, normals, cuts, z, edges):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _cut_sphere_volume(radius, normals, cuts, angles, shares):  # type: ignore[no-untyped-def]
+def cut_sphere_volume(radius, normals, cuts, angles, shares):  # type: ignore[no-untyped-def]
     """Volume of a sphere within the half-spaces ``normal . p <= cut`` about its centre."""
     if cuts.size and cuts.min() <= -radius:
         return 0.0
@@ -310,5 +324,5 @@ def _sum_of_cut_spheres(radii, starts, normals, cuts, angles, shares):  # type: 
     total = 0.0
     for i in range(radii.size):
         rows = slice(starts[i], starts[i + 1])
-        total += _cut_sphere_volume(radii[i], normals[rows], cuts[rows], angles, shares)
+        total += cut_sphere_volume(radii[i], normals[rows], cuts[rows], angles, shares)
     return total

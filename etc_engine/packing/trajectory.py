@@ -23,6 +23,8 @@ class Trajectory:
         One a time, of the same number of particles in the same box.
     ids : ndarray of int64, shape (n,), optional
         Numbers of the particles; their rows by default.
+    conductivity : ndarray, shape (n,), optional [W/(m K)]
+        Conductivity of each particle, where its file gives it.
 
     Raises
     ------
@@ -40,6 +42,7 @@ class Trajectory:
     times: NDArray[np.float64]
     packings: tuple[ParticlePacking, ...]
     ids: NDArray[np.int64] | None = None
+    conductivity: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         times, packings = np.array(self.times, dtype=np.float64), tuple(self.packings)

@@ -13,19 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags_array
 
-from etc_engine.box import AXES
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.element import Material
 from etc_engine.dtem.field import fill_dead_ends
 from etc_engine.dtem.sides import contact_sides
 from etc_engine.dtem.steady import make_material
-from etc_engine.errors import ConvergenceError
-from etc_engine.percolation import Backbone, asked_groups, find_backbone, find_backbones
+from etc_engine.percolation import Backbone, find_backbone, find_backbones
 from etc_engine.pipe.conductances import pipe_conductances
 from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
-
-# The wall flows of a solution must agree with its energy and with each other to this part of the flux.
-BALANCE = 1e-6
+from etc_engine.tensor import EffectiveConductivity, assemble_tensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,45 +71,6 @@ class PipeSolution:
         return "pipe"
 
 
-@dataclass(frozen=True, eq=False)
-class PipeConductivity:
-    """Effective conductivity of the pipe network of one packing.
-
-    Parameters
-    ----------
-    tensor : ndarray, shape (2, 2) [W/(m K)]
-        Symmetric for a periodic box; components that walls leave undefined, or that were not asked for, are NaN.
-    spans : tuple of bool or None
-        For each axis, whether some cluster of contacts spans it; None if it was not asked for.
-    solutions : tuple of PipeSolution
-        The solutions behind it.
-    """
-
-    tensor: NDArray[np.float64]
-    spans: tuple[bool | None, ...]
-    solutions: tuple[PipeSolution, ...]
-
-    @property
-    def unknowns(self) -> int:
-        """Largest number of unknowns of a solve, dead ends taken out."""
-        return max((r.unknowns for s in self.solutions for r in s.reports), default=0)
-
-    @property
-    def iterations(self) -> int:
-        """Largest number of iterations of a solve."""
-        return max((r.iterations for s in self.solutions for r in s.reports), default=0)
-
-    @property
-    def relative_energy_error(self) -> float:
-        """Largest relative error of the conductivity estimated by a solve."""
-        return max((r.relative_energy_error for s in self.solutions for r in s.reports), default=0.0)
-
-    @property
-    def missing_axes(self) -> str:
-        """Axes that no path of contacts spans, as a word."""
-        return "".join(AXES[axis] for axis, flag in enumerate(self.spans) if flag is False)
-
-
 def pipe_conductivity(
     network: ContactNetwork,
     *,
@@ -123,7 +80,7 @@ def pipe_conductivity(
     tolerance: float = 1e-10,
     axes: tuple[int, ...] | None = None,
     backbones: Mapping[tuple[int, ...], Backbone] | None = None,
-) -> PipeConductivity:
+) -> EffectiveConductivity[PipeSolution]:
     """Effective conductivity by the pipe network.
 
     Walls: k_aa = Q L_a / (S_a dT). Periodic: k_ab = (1/area) sum_c C_c dT_ca dT_cb.
@@ -142,7 +99,7 @@ def pipe_conductivity(
 
     Returns
     -------
-    PipeConductivity
+    EffectiveConductivity
         0 along an axis that no path of contacts spans.
 
     Raises
@@ -151,8 +108,9 @@ def pipe_conductivity(
 
     Notes
     -----
-    Mutual resistances between the contacts of a particle are left out: against the discrete thermal element method
-    it errs by several per cent either way.
+    Mutual resistances between the contacts of a particle are left out. In random assemblies with contacts of 1 to 15
+    degrees the conductivity is within -2.1 and +0.7 % of the exact one with ``chord``, 1.6 to 9.1 % low with
+    ``uniform``.
 
     References
     ----------
@@ -171,11 +129,9 @@ def pipe_conductivity(
     """
     box = network.packing.box
     backbones = backbones or find_backbones(network, axes)
-    tensor = np.full((box.dimension, box.dimension), np.nan)
-    spans: list[bool | None] = [None] * box.dimension
-    solutions = []
-    for group in asked_groups(box, axes):
-        solution = solve_pipe(
+
+    def solve(group: tuple[int, ...]) -> PipeSolution:
+        return solve_pipe(
             network,
             group,
             resistance=resistance,
@@ -184,32 +140,16 @@ def pipe_conductivity(
             tolerance=tolerance,
             backbone=backbones[group],
         )
-        for axis, flag in zip(group, solution.backbone.spans, strict=True):
-            spans[axis] = flag
-        if box.periodic[group[0]]:
-            spanned = np.outer(solution.backbone.spans, solution.backbone.spans)
-            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume * spanned
-        else:
-            axis, energy = group[0], float(solution.energies[0, 0])
-            ends = [float(solution.wall_flows[network.walls == 2 * axis + end, 0].sum()) for end in (0, 1)]
-            check_balance(-ends[0], ends[1], energy)
-            tensor[axis, axis] = energy * box.lengths[axis] / box.cross_section(axis)
-        solutions.append(solution)
-    return PipeConductivity(tensor, tuple(spans), tuple(solutions))
+
+    return assemble_tensor(box, axes, solve, _wall_heat_flows)
 
 
-def check_balance(heat_in: float, heat_out: float, energy: float) -> None:
-    """Refuse heat flows at two walls that differ from each other or from the energy.
-
-    Raises
-    ------
-    ConvergenceError
-    """
-    if max(abs(heat_in - heat_out), abs(heat_in - energy)) > BALANCE * abs(energy):
-        raise ConvergenceError(
-            f"the heat flows do not balance: {heat_in:.10g} in, {heat_out:.10g} out, energy {energy:.10g}; "
-            f"ask for a smaller tolerance"
-        )
+def _wall_heat_flows(solution: PipeSolution) -> tuple[float, float]:
+    """Heat flow into the particles at the low wall and out of them at the far wall [W/m]."""
+    low, far = (
+        float(solution.wall_flows[solution.network.walls == 2 * solution.axes[0] + end, 0].sum()) for end in (0, 1)
+    )
+    return -low, far
 
 
 def solve_pipe(

@@ -20,6 +20,7 @@ from scipy.sparse import csr_matrix
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.storage import stored_areas
 from etc_engine.errors import InputError
+from etc_engine.packing.particles import particle_values
 from etc_engine.pipe.conductances import PIPE_RESISTANCES, pipe_conductances
 from etc_engine.pipe.steady import pipe_laplacian
 from etc_engine.solvers.marching import HeatSystem
@@ -67,7 +68,7 @@ class PipeTransient:
         """
         centers = self.network.packing.centers
         given = np.asarray(temperatures(centers) if callable(temperatures) else temperatures, dtype=np.float64)
-        particles = _of_particles(given, centers.shape[0], "initial temperature")
+        particles = particle_values(given, centers.shape[0], "initial temperature")
         return np.concatenate([particles, np.full(self.plates.size, particles.mean())])
 
     def particle_temperatures(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -141,7 +142,7 @@ def pipe_transient(
     between, at_wall = pipe_conductances(
         network, resistance=resistance, conductivity=conductivity, contact_resistance=contact_resistance
     )
-    density = _of_particles(heat_capacity, n, "heat capacity")
+    density = particle_values(heat_capacity, n, "heat capacity")
     if not (density > 0.0).all():
         raise InputError(f"the heat capacity must be positive, found {density.min():g}")
     capacity = density * stored_areas(network, PIPE_RESISTANCES[resistance])
@@ -228,14 +229,6 @@ def _source(source: Source, count: int) -> Callable[[float], NDArray[np.float64]
     """Heat set free in each particle at a time [W/m]."""
     if callable(source):
         history = source
-        return lambda t: _of_particles(history(t), count, "source")
-    constant = _of_particles(source, count, "source")
+        return lambda t: particle_values(history(t), count, "source")
+    constant = particle_values(source, count, "source")
     return lambda _: constant
-
-
-def _of_particles(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
-    """One value for all particles, or one for each."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (count,)) or not np.isfinite(array).all():
-        raise InputError(f"the {name} must be one finite number or {count} of them, found shape {array.shape}")
-    return np.broadcast_to(array, (count,)).copy()

@@ -12,6 +12,7 @@ from etc_engine.dtem.methods import METHODS as DTEM_METHODS
 from etc_engine.errors import PackingError
 from etc_engine.packing import ParticlePacking, pack
 from etc_engine.packing.structure import solid_fraction
+from etc_engine.realization.composites import conduct_lattice, conduct_voxel
 from etc_engine.realization.networks import conduct_dtem, conduct_pipe
 from etc_engine.realization.outcome import Cell, Cells, Realization, Status, uniform_cells
 from etc_engine.realization.specification import RealizationSpec
@@ -42,6 +43,8 @@ class Engine:
 ENGINES: Mapping[str, Engine] = {
     "dtem": Engine(conduct_dtem, ("chord", *(name for name in DTEM_METHODS if name != "chord")), (2,)),
     "pipe": Engine(conduct_pipe, ("chord", "uniform"), (2,)),
+    "lattice": Engine(conduct_lattice, ("laguerre", "contact"), (3,), composite=True),
+    "voxel": Engine(conduct_voxel, ("laminate", "binary"), (2, 3), composite=True),
 }
 
 

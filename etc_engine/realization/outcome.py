@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.errors import ConvergenceError, EtcError
 from etc_engine.realization.specification import RealizationSpec
 
 
@@ -63,6 +66,19 @@ class Realization:
     solid_fraction: float
     pack_seconds: float
     cells: Cells
+
+
+def attempted(solve: Callable[[], Cell], dimension: int = 2) -> Cell:
+    """The cell that a solver makes, with the time it took; what it raises becomes the status and the message."""
+    start = time.perf_counter()
+    nowhere = np.full((dimension, dimension), np.nan)
+    try:
+        cell = solve()
+    except ConvergenceError as error:
+        return Cell(Status.NOT_CONVERGED, str(error), nowhere)
+    except EtcError as error:
+        return Cell(Status.ERROR, str(error), nowhere)
+    return replace(cell, solve_seconds=time.perf_counter() - start)
 
 
 def uniform_cells(spec: RealizationSpec, cell: Cell) -> Cells:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from etc_engine.batch.provenance import command_line, engine_commit, engine_version, now, versions
 from etc_engine.errors import InputError, OutputError
-from etc_engine.packing.particles import ParticlePacking
 from etc_engine.results.vtk import SPOKES, vtk_cells
+from etc_engine.transient.moving import MovingState
 from etc_engine.transient.run import Transient
 from etc_engine.walls import WALLS
 
@@ -33,21 +33,22 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
     -------
     xarray.Dataset
         Dimensions ``time``, ``particle`` and ``wall``; everything per unit thickness. ``stored_heat`` is the sum of
-        ``wall_heat`` and ``source_heat``; ``heat_imbalance`` is what is left of that.
+        ``wall_heat`` and ``source_heat``; ``heat_imbalance`` is what is left of that. Of moving particles, centres and
+        radii have the dimension ``time`` too, and ``particle`` holds the ids of the dump.
     """
     import xarray
 
-    states, system, packing = transient.states, transient.system, transient.network.packing
-    rates = np.array([system.heat.rates(state.time, state.temperatures) for state in states])
+    states, packing = transient.states, transient.network.packing
+    rates, means = _rates_and_means(transient)
     heat = np.array([state.heat for state in states])
-    means = np.array([system.particle_temperatures(state.temperatures) for state in states])
-    capacities = _particle_capacities(transient)
+    capacities = particle_capacities(transient)
     stored = np.array([state.stored for state in states])
     steps, iterations = np.array([(state.steps, state.iterations) for state in states]).T
+    where, centers, radii = _places(transient)
     data = {
-        "x": ("particle", packing.centers[:, 0], "m", "centre"),
-        "y": ("particle", packing.centers[:, 1], "m", "centre"),
-        "radius": ("particle", packing.radii, "m", "radius"),
+        "x": (where, centers[..., 0], "m", "centre"),
+        "y": (where, centers[..., 1], "m", "centre"),
+        "radius": (where, radii, "m", "radius"),
         "heat_capacity": ("particle", capacities, "J m-1 K-1", "heat capacity of the particle per unit thickness"),
         "temperature": (("time", "particle"), means, "K", "mean temperature of the particle"),
         "mean_temperature": ("time", means @ capacities / capacities.sum(), "K", "mean temperature, by heat capacity"),
@@ -65,6 +66,7 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
             "solver iterations since the start",
         ),
     }
+    data |= _changes(transient)
     variables = {
         name: (dims, values, {"units": units, "long_name": meaning})
         for name, (dims, values, units, meaning) in data.items()
@@ -97,14 +99,59 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
     )
 
 
-def _particle_capacities(transient: Transient) -> NDArray[np.float64]:
-    """Heat capacity of each particle: what its temperature adds up, one kelvin at a time, whatever its states."""
+def _rates_and_means(transient: Transient) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Heat flows and mean temperatures at the output times."""
+    system = transient.system
+    rates, means = [], []
+    for state in transient.states:
+        if isinstance(state, MovingState):
+            rates.append(state.rates)
+            means.append(state.temperatures)
+        else:
+            rates.append(system.heat.rates(state.time, state.temperatures))
+            means.append(system.particle_temperatures(state.temperatures))
+    return np.array(rates), np.array(means)
+
+
+def _places(transient: Transient) -> tuple[Any, NDArray[np.float64], NDArray[np.float64]]:
+    """Dimensions, centres and radii of the particles."""
+    packing = transient.network.packing
+    if transient.trajectory is None:
+        return "particle", packing.centers, packing.radii
+    radii = [state.radii for state in transient.states if isinstance(state, MovingState)]
+    centers = [packing.centers for packing in transient.trajectory.packings[: len(radii)]]
+    return ("time", "particle"), np.array(centers), np.array(radii)
+
+
+def _changes(transient: Transient) -> dict[str, tuple[Any, Any, str, str]]:
+    """What moving particles do to their contacts."""
+    states = [state for state in transient.states if isinstance(state, MovingState)]
+    if transient.trajectory is None or not states:
+        return {}
+    return {
+        "id": ("particle", transient.trajectory.ids, "1", "id of the particle in the dump"),
+        "particle_contacts": (
+            "time",
+            [state.contacts for state in states],
+            "1",
+            "contacts between particles from here on",
+        ),
+        "opened_contacts": ("time", [state.opened for state in states], "1", "pairs that parted since the time before"),
+        "closed_contacts": ("time", [state.closed for state in states], "1", "pairs that met since the time before"),
+    }
+
+
+def particle_capacities(transient: Transient) -> NDArray[np.float64]:
+    """Heat capacity of each particle, shape (n,) [J/(m K)]; of moving ones that of the whole disk."""
     system, n = transient.system, transient.network.packing.count
+    if transient.trajectory is not None:
+        rho_c = np.asarray(transient.study.material.heat_capacity, dtype=np.float64)
+        return np.asarray(transient.network.packing.measures * rho_c)
     rows = system.heat.capacity[system.heat.capacity > 0.0]
     return np.asarray(rows.reshape(n, -1).sum(axis=1))
 
 
-def write_vtk_series(path: Path, packing: ParticlePacking, series: xarray.Dataset) -> None:
+def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
     """Write a ``.pvd`` collection, and beside it a folder of ``.vtp`` files, one an output time.
 
     Polygons of the particles; cell data ``temperature`` and ``particle``.
@@ -113,7 +160,6 @@ def write_vtk_series(path: Path, packing: ParticlePacking, series: xarray.Datase
     ----------
     path : Path
         Ends in ``.pvd``; the files go into the folder of that name without the ending.
-    packing : ParticlePacking
     series : xarray.Dataset
         From `series_dataset`.
 
@@ -138,11 +184,9 @@ def write_vtk_series(path: Path, packing: ParticlePacking, series: xarray.Datase
     to_vtk: Any = numpy_support.numpy_to_vtk
     turn = 2.0 * np.pi * np.arange(SPOKES) / SPOKES
     rim = np.stack([np.cos(turn), np.sin(turn), np.zeros(SPOKES)], axis=1)
-    centers = np.column_stack([packing.centers, np.zeros(packing.count)])
-    data, places = vtkPolyData(), vtkPoints()
-    places.SetData(to_vtk((centers[:, None] + packing.radii[:, None, None] * rim).reshape(-1, 3).copy(), deep=True))
-    data.SetPoints(places)
-    data.SetPolys(vtk_cells([np.arange(packing.count * SPOKES).reshape(-1, SPOKES)]))
+    count = series.sizes["particle"]
+    data = vtkPolyData()
+    data.SetPolys(vtk_cells([np.arange(count * SPOKES).reshape(-1, SPOKES)]))
     folder = path.with_suffix("")
     try:
         folder.mkdir(exist_ok=True)
@@ -150,7 +194,14 @@ def write_vtk_series(path: Path, packing: ParticlePacking, series: xarray.Datase
         raise OutputError(f"cannot write {folder}: {error.strerror}") from None
     entries = []
     for k, time in enumerate(series["time"].values):
-        values = {"temperature": series["temperature"].values[k], "particle": np.arange(packing.count)}
+        place = series[["x", "y", "radius", "temperature"]].isel(time=k)
+        centers = np.column_stack([place["x"], place["y"], np.zeros(count)])
+        points = vtkPoints()
+        points.SetData(
+            to_vtk((centers[:, None] + place["radius"].values[:, None, None] * rim).reshape(-1, 3), deep=True)
+        )
+        data.SetPoints(points)
+        values = {"temperature": place["temperature"].values, "particle": np.arange(count)}
         for name, column in values.items():
             array = to_vtk(np.ascontiguousarray(column), deep=True)
             array.SetName(name)

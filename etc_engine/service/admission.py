@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel
 
@@ -19,6 +19,9 @@ from etc_engine.service.settings import Limits
 SOURCE = "study"
 FULL = 1.0
 """A density no packing without a count is expected to exceed."""
+
+BASE_BYTES, PARTICLE_BYTES, VOXEL_BYTES, NODE_BYTES = 250e6, 1600.0, 300.0, 3000.0
+"""Memory of a rank: of its libraries, of a particle, a voxel, a node of a lattice (measured, and rounded upwards)."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ def _measure(study: Study, text: str) -> Application:
         id=study_id(study),
         units=densities * study.statistics.realizations,
         most=most,
-        cells=most * len(study.contacts.contact_angle or (None,)) * len(study.conduction.methods),
+        cells=most * len(study.variants[1] or (None,)) * len(study.conduction.methods),
         particles=expected_particles(study),
     )
 
@@ -110,6 +113,24 @@ def _refuse_excess(found: Application, limits: Limits) -> None:
     ):
         if not value <= limit:
             raise StudyError(f"{SOURCE}: {field}: makes about {value:.6g} {what}, this service allows {limit}")
+    memory, allowed = _expected_memory(found) / 1e6, limits.memory_bytes / 1e6
+    if not memory <= allowed:
+        field = "packing.box" if found.study.composite is None else "composite"
+        raise StudyError(
+            f"{SOURCE}: {field}: takes about {memory:.0f} MB of memory a rank, this service allows {allowed:.0f}"
+        )
+
+
+def _expected_memory(found: Application) -> float:
+    """Bytes of a rank."""
+    study = found.study
+    packing = BASE_BYTES + PARTICLE_BYTES * found.particles
+    if study.composite is None:
+        return packing
+    if study.conduction.engine == "lattice":
+        return packing + NODE_BYTES * study.composite.nodes
+    lengths = study.packing.box
+    return packing + VOXEL_BYTES * math.prod(study.composite.resolution * length / min(lengths) for length in lengths)
 
 
 def field_of(message: str) -> str:
@@ -133,8 +154,8 @@ def field_of(message: str) -> str:
             if name not in fields:
                 return ".".join([*words, name] if "unknown key" in message else words)
             words.append(name)
-            kind = fields[name].annotation
-            table = kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+            kinds = get_args(fields[name].annotation) or (fields[name].annotation,)
+            table = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
     return ".".join(words)
 
 

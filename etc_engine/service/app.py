@@ -11,7 +11,7 @@ from importlib.resources import files
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, FastAPI, Query, Request
-from fastapi.responses import FileResponse, PlainTextResponse, Response
+from fastapi.responses import FileResponse, Response
 from pydantic import AfterValidator
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -127,6 +127,7 @@ def about(request: Request) -> About:
         packing_methods=list(METHODS),
         size_distributions=list(SHOWN_WORDS),
         conduction_methods={name: list(engine.methods) for name, engine in ENGINES.items()},
+        composite_engines=[name for name, engine in ENGINES.items() if engine.composite],
     )
 
 
@@ -212,19 +213,20 @@ def resume_study(request: Request, study: Id) -> StudySummary:
     return StudySummary.of(_entry(request, study))
 
 
-@api.get("/studies/{study}/study.toml", response_class=PlainTextResponse)
-def study_text(request: Request, study: Id) -> PlainTextResponse:
+@api.get("/studies/{study}/study.toml", responses={200: {"content": {"text/plain": {}}}})
+def study_text(request: Request, study: Id) -> Response:
     """The study as it was handed in."""
     _entry(request, study)
-    text = _service(request).store.study_file(study).read_text(encoding="utf-8")
-    return PlainTextResponse(text, media_type="text/plain; charset=utf-8")
+    return Response(_service(request).store.study_file(study).read_bytes(), media_type="text/plain; charset=utf-8")
 
 
 @api.get("/studies/{study}/curve", responses={200: {"content": {"application/json": {}}}})
-def study_curve(request: Request, study: Id) -> Response:
+async def study_curve(request: Request, study: Id) -> Response:
     """Conductivity over density with confidence intervals and models: complete, or of the realizations so far."""
     _entry(request, study)
-    return Response(_service(request).live.curve(study), media_type="application/json")
+    live = _service(request).live
+    answer = live.fresh_curve(study) or await run_in_threadpool(live.curve, study)
+    return Response(answer, media_type="application/json")
 
 
 @api.get("/studies/{study}/result.nc", response_class=FileResponse)
@@ -246,7 +248,9 @@ def study_report(request: Request, study: Id) -> FileResponse:
 @api.post("/solve", openapi_extra=PARTICLES_BODY)
 async def solve(
     request: Request,
-    box: Annotated[str | None, Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, such as 1,1")] = None,
+    box: Annotated[
+        str | None, Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, for CSV", examples=["1,1"])
+    ] = None,
     periodic: Annotated[str | None, Query(pattern="^[xyz]{0,3}$")] = None,
     frame: Annotated[int | None, Query(ge=-(10**9), le=10**9)] = None,
     method: Annotated[str, Query(pattern="^[a-z]{1,20}$")] = "chord",

@@ -27,9 +27,10 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``, each with ``contact_angle``
-        [degree], ``method``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities; ``models`` with
-        their lines, ``remark`` where there are none, ``bounds_broken``. A number that is not there is None.
+        ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``: ``contact_angle`` [degree],
+        ``contrast`` and ``method`` (None where the sweep has no such axis), ``mean``, ``low``, ``high`` [W/(m K)] and
+        ``count`` over the densities. ``models`` with their curves, ``remark`` where there are none,
+        ``bounds_broken``. A number that is not there is None.
     """
     units = int((dataset["worker_rank"].values >= 0).sum())
     found: dict[str, Any] = {"units": units, "confidence": float(dataset.attrs["confidence_level"])}
@@ -53,16 +54,15 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
 
 def _places(statistics: xarray.Dataset) -> list[dict[str, int]]:
     """One index for every curve."""
-    names = [name for name in ("contact_angle", "method") if name in statistics["conductivity_mean"].dims]
+    names = [str(name) for name in statistics["conductivity_mean"].dims if name != "density"]
     sizes = [statistics.sizes[name] for name in names]
     return [dict(zip(names, place, strict=True)) for place in np.ndindex(*sizes)]
 
 
 def _series(cell: xarray.Dataset) -> dict[str, Any]:
-    angle, method = cell.coords.get("contact_angle"), cell.coords.get("method")
+    axes = {name: cell.coords.get(name) for name in ("contact_angle", "contrast", "method")}
     return {
-        "contact_angle": None if angle is None else float(angle),
-        "method": None if method is None else str(method.values),
+        **{name: None if value is None else value.values.item() for name, value in axes.items()},
         "mean": plain(cell["conductivity_mean"].values),
         "low": plain(cell["conductivity_ci_low"].values),
         "high": plain(cell["conductivity_ci_high"].values),
@@ -73,16 +73,19 @@ def _series(cell: xarray.Dataset) -> dict[str, Any]:
 def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
     """Every model: a smooth line, and how far it is from the simulation."""
     lines = model_lines(comparison)
-    drawn = {str(name): lines["model_conductivity"].sel(model=name).values for name in lines["model"].values}
+    drawn = {
+        str(name): lines["model_conductivity"].sel(model=name).transpose(..., "density").values
+        for name in lines["model"].values
+    }
     found = []
     for name in comparison["model"].values:
         one = comparison.sel(model=name)
         value = one["model_conductivity"]
         if str(name) in drawn:
-            density, curves = lines["density"].values, [drawn[str(name)]]
+            density, curves = lines["density"].values, np.atleast_2d(drawn[str(name)])
         else:  # the contact mean field: values on the sweep only, a curve for every angle and method
             density = comparison["density"].values
-            curves = [_over_density(value.isel(place)) for place in _places(comparison)]
+            curves = np.array([_over_density(value.isel(place)) for place in _places(comparison)])
         squares = np.asarray(one["rms_relative_difference"].values, dtype=np.float64) ** 2
         found.append(
             {
@@ -91,7 +94,7 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
                 "kind": str(one["model_kind"].values),
                 "note": str(one["model_note"].values),
                 "density": plain(density),
-                "curves": [plain(curve) for curve in curves],
+                "curves": plain(curves),
                 "rms_relative_difference": plain(np.sqrt(squares.mean())),
             }
         )

@@ -35,10 +35,12 @@ class Launcher(Protocol):
 
     concurrent: int
     """Batches at a time."""
-    interval: float
-    """Seconds between two looks at a batch."""
     outlives: bool
     """Whether batches go on when the service stops."""
+
+    @property
+    def interval(self) -> float:
+        """Seconds between two looks at a batch."""
 
     def start(self, study: str) -> str:
         """Start the batch of a study; answers how it is found again."""
@@ -63,7 +65,7 @@ class LocalLauncher:
     store: Store
     settings: Settings
     concurrent: int = 1
-    interval: float = 0.1
+    interval: float = 0.2
     outlives: bool = False
     _children: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
@@ -129,8 +131,12 @@ class SlurmLauncher:
     store: Store
     settings: Settings
     concurrent: int = 16
-    interval: float = 5.0
     outlives: bool = True
+
+    @property
+    def interval(self) -> float:
+        """As the settings say: a controller is shared by many."""
+        return self.settings.squeue_seconds
 
     def start(self, study: str) -> str:
         """Write the script beside the study and submit it; answers the number of the job."""

@@ -21,7 +21,7 @@ from etc_engine.service.store import Store
 if TYPE_CHECKING:
     import xarray
 
-SHARE = 0.03
+SHARE = 0.02
 """Growing figures are made anew so seldom that they take at most this share of one core."""
 FRESH_SECONDS = 1.0
 TAIL_BYTES = 8192
@@ -40,6 +40,11 @@ class _Growing:
     cost: float = 0.0
     answer: bytes = b""
     units: int = -1
+
+    @property
+    def fresh(self) -> bool:
+        """Whether the answer is recent enough for what it costs."""
+        return time.monotonic() - self.made < max(FRESH_SECONDS, self.cost / SHARE)
 
 
 @dataclass
@@ -88,6 +93,13 @@ class LiveResults:
         folder = self.store.shards(study)
         self._lines = {path: seen for path, seen in self._lines.items() if path.parent != folder}
 
+    def fresh_curve(self, study: str) -> bytes | None:
+        """The answer of `curve` if it can be given at once, without waiting for anybody."""
+        if (finished := self._finished.get(study)) is not None:
+            return finished
+        growing = self._growing.get(study)
+        return growing.answer if growing is not None and growing.fresh else None
+
     def curve(self, study: str) -> bytes:
         """Conductivity over density with confidence intervals and models, as JSON: see `curve_of`.
 
@@ -107,7 +119,7 @@ class LiveResults:
                 growing = _Growing(text, ShardReader(self.store.shards(study)), tabulate(text, []))
                 self._growing[study] = growing
                 _drop_oldest(self._growing)
-            if time.monotonic() - growing.made > max(FRESH_SECONDS, growing.cost / SHARE):
+            if not growing.fresh:
                 started = time.thread_time()
                 _grow(growing)
                 growing.made, growing.cost = time.monotonic(), time.thread_time() - started

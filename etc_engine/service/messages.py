@@ -96,6 +96,7 @@ class About(BaseModel):
     packing_methods: list[str]
     size_distributions: list[str]
     conduction_methods: dict[str, list[str]] = Field(description="methods of each engine")
+    composite_engines: list[str] = Field(description="engines that solve the whole medium and take [composite]")
 
 
 class Solved(BaseModel):

@@ -163,6 +163,10 @@ class Queue:
             (now(), study),
         )
 
+    def forgive(self, study: str) -> None:
+        """Forget attempts: it was not the batch's fault."""
+        self._do("UPDATE studies SET attempts = 0 WHERE id = ?", (study,))
+
     def set_batch(self, study: str, batch: str) -> None:
         """Note how the running batch is found again."""
         self._do("UPDATE studies SET batch = ? WHERE id = ?", (batch, study))

@@ -13,29 +13,38 @@ from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
 
 from etc_engine.errors import EtcError, StudyError
-from etc_engine.service.admission import field_of
+from etc_engine.service.admission import field_of, toml_of
 from etc_engine.service.messages import Problem
 from etc_engine.service.running import BusyError, EngineError
 
 log = logging.getLogger("etc_engine.service")
 
+STUDY_EXAMPLE = {
+    "schema": 1,
+    "name": "example",
+    "seed": 20261,
+    "packing": {"radii": "uniform:0.01:0.02", "box": [1.0, 1.0], "density": [0.66, 0.72]},
+    "contacts": {"rule": "bonded", "contact_angle": [5.0]},
+    "statistics": {"realizations": 5},
+}
 STUDY_BODY = {
     "requestBody": {
         "required": True,
         "description": "a study, as TOML or as JSON of the same structure",
         "content": {
-            "application/toml": {"schema": {"type": "string"}},
-            "application/json": {"schema": {"type": "object"}},
+            "application/toml": {"schema": {"type": "string"}, "example": toml_of(STUDY_EXAMPLE)},
+            "application/json": {"schema": {"type": "object"}, "example": STUDY_EXAMPLE},
         },
     }
 }
+PARTICLES_EXAMPLE = "x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n"
 PARTICLES_BODY = {
     "requestBody": {
         "required": True,
         "description": "a CSV file with the columns x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS text dump",
         "content": {
-            "text/csv": {"schema": {"type": "string"}},
-            "application/octet-stream": {"schema": {"type": "string"}},
+            "text/csv": {"schema": {"type": "string"}, "example": PARTICLES_EXAMPLE},
+            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
         },
     }
 }
@@ -74,9 +83,12 @@ def _refuse_input(_request: Request, error: Exception) -> Response:
     return _problem(422, str(error), field_of(str(error)) if isinstance(error, StudyError) else "")
 
 
-def _refuse_request(_request: Request, error: Exception) -> Response:
+def _refuse_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    return _problem(error.status_code, str(error.detail))
+    reason = str(error.detail)
+    if reason == "Not Found":
+        reason = f"there is nothing at {request.url.path[:200]}"
+    return _problem(error.status_code, reason)
 
 
 def _refuse_parameter(_request: Request, error: Exception) -> Response:

@@ -67,6 +67,8 @@ class Settings:
         Further names under which clients may call, such as that of a proxy.
     sbatch : tuple of str
         Further options of ``sbatch``.
+    squeue_seconds : float
+        How often Slurm is asked for the state of a job.
     limits : Limits
     engine : tuple of str
         The command that is followed by ``sweep``, ``solve`` or ``report``.
@@ -80,5 +82,6 @@ class Settings:
     token: str = field(default="", repr=False)
     hosts: tuple[str, ...] = ()
     sbatch: tuple[str, ...] = ()
+    squeue_seconds: float = 5.0
     limits: Limits = field(default_factory=Limits)
     engine: tuple[str, ...] = ENGINE

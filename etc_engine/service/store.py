@@ -25,6 +25,8 @@ from etc_engine.batch.shards import shard_folder, write_atomically
 from etc_engine.errors import OutputError
 
 FORMAT = 1
+FIRST = {"lock", "scratch", "studies"}
+"""What a service that found no room for its format file has left."""
 ROOM = 1 << 20
 """Bytes that have to fit on the disk for the service to start."""
 
@@ -115,7 +117,7 @@ def _check_kind(root: Path) -> None:
         raise OutputError(f"data directory {root}: is a file, expected a folder")
     mark = root / "format.json"
     if not mark.exists():
-        strange = sorted(path.name for path in root.iterdir() if path.name != "lock")
+        strange = sorted({path.name for path in root.iterdir()} - FIRST)
         if strange:
             raise OutputError(
                 f"data directory {root}: holds other things ({strange[0]}, ...), expected a new or an empty folder"

@@ -12,6 +12,7 @@ import threading
 import time
 from dataclasses import dataclass, field
 
+from etc_engine.batch.provenance import now
 from etc_engine.errors import EtcError
 from etc_engine.service.launchers import Ended, Launcher
 from etc_engine.service.live import LiveResults, log_tail
@@ -23,11 +24,13 @@ log = logging.getLogger("etc_engine.service")
 
 ATTEMPTS = 3
 """Starts without a single finished unit before a study counts as failed."""
+START, ENGINE = "== start", "etc-engine: "
+"""How a batch begins in the log of its study, and a line of the engine itself."""
 GRACE = 30.0
 """Seconds that a batch may take to end when it is asked to."""
 REFUSED = 2
 COUNT_SECONDS = 1.0
-RETRY_SECONDS = 2.0
+RETRY_SECONDS = 1.0
 
 
 @dataclass
@@ -64,6 +67,7 @@ class Supervisor:
     def start(self) -> None:
         """Take up what an earlier service left running, and begin."""
         for entry in self._queue.entries("running", limit=-1):
+            self._queue.forgive(entry.id)  # whatever ended it may have been the end of the service
             if not entry.batch:
                 self._queue.set_batch(entry.id, self._launcher.find(entry.id))
         self._thread.start()
@@ -119,6 +123,8 @@ class Supervisor:
         self._queue.begin(entry.id)
         self._watches[entry.id] = _Watch()
         try:
+            with self._store.log(entry.id).open("a") as file:
+                file.write(f"{START} {now()}\n")
             self._queue.set_batch(entry.id, self._launcher.start(entry.id))
         except (OSError, EtcError) as error:
             self._try_again(self._queue.require(entry.id), str(error))
@@ -165,11 +171,12 @@ class Supervisor:
             self._queue.put_back(entry.id, "")
         else:
             self._count(entry)
-            said = last_line(log_tail(self._store.log(entry.id)))
+            said = last_line(log_tail(self._store.log(entry.id)).rpartition(START)[2])
             if ended.status == REFUSED and "another run is computing" not in said:
                 self._queue.settle(entry.id, "failed", said)
             else:
-                self._try_again(self._queue.require(entry.id), said)
+                code = "" if ended.status is None else f" with status {ended.status}"
+                self._try_again(self._queue.require(entry.id), said or f"its batch ended{code}, see the log")
 
     def _finish(self, entry: Entry) -> None:
         """The result is there: complete, unless somebody has meddled with it."""
@@ -183,20 +190,19 @@ class Supervisor:
     def _try_again(self, entry: Entry, reason: str) -> None:
         """The study goes on at once after progress, a little later without, and fails after three such starts."""
         if entry.attempts >= ATTEMPTS:
-            self._queue.settle(entry.id, "failed", reason or "its batch ends without a finished unit")
+            self._queue.settle(entry.id, "failed", reason)
             return
         self._later[entry.id] = time.monotonic() + RETRY_SECONDS * entry.attempts
         self._queue.put_back(entry.id, reason)
 
 
 def last_line(text: str) -> str:
-    """The last thing the engine said in a log, without its name.
+    """The last thing the engine itself said in a log; empty if it said nothing.
 
     Examples
     --------
-    >>> last_line("etc-engine: cannot write shard: no space\\nkilled\\n")
+    >>> last_line("etc-engine: cannot write shard: no space\\nPlease see the FAQ page\\n")
     'cannot write shard: no space'
     """
-    lines = [line for line in text.splitlines() if line.strip()]
-    ours = [line for line in lines if line.startswith("etc-engine: ")]
-    return (ours or lines or [""])[-1].removeprefix("etc-engine: ")
+    lines = [line for line in text.splitlines() if line.startswith(ENGINE)]
+    return lines[-1].removeprefix(ENGINE) if lines else ""

@@ -20,6 +20,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.solvers import time_steps
+from etc_engine.solvers.amg_cg import EXACT_LEVEL
 from etc_engine.solvers.step_matrix import StepMatrix, step_matrix
 from etc_engine.solvers.time_steps import AlgebraicRows, HeatSystem, Step, algebraic_rows
 
@@ -90,6 +91,7 @@ def march(
     steps: int | None = None,
     tolerance: float = 1e-3,
     solver_tolerance: float = 1e-10,
+    exact_level: int = EXACT_LEVEL,
     restart: MarchState | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Iterator[MarchState]:
@@ -114,8 +116,11 @@ def march(
         Largest estimated error of an ``adaptive`` step at any node.
     solver_tolerance : float
         Largest error of the temperatures left by the linear solver, relative to their magnitude.
+    exact_level : int
+        Most nodes of a step matrix that is factorised instead of being given a multigrid hierarchy. A factorisation
+        takes longer and solves faster: many steps of a planar network pay for it far beyond the default.
     restart : MarchState, optional
-        A state at one of the times, to go on from; the initial values are still those of the start.
+        A state at one of the times, to go on from; all other arguments are those of the start.
     progress : callable, optional
         Told the time after every step.
 
@@ -157,7 +162,7 @@ def march(
     start = np.asarray(initial, dtype=np.float64)
     algebraic = algebraic_rows(system, solver_tolerance)
     fitted = algebraic.fit(system, times[0], start)
-    run = _Run(system, scheme, fitted, algebraic, solver_tolerance, tolerance, progress, OrderedDict())
+    run = _Run(system, scheme, fitted, algebraic, solver_tolerance, tolerance, exact_level, progress, OrderedDict())
     if restart is None:
         none = np.zeros_like(system.rates(times[0], fitted))
         state = MarchState(times[0], fitted, none, 0.0, 0, 0, 0.0, fitted, none)
@@ -185,6 +190,7 @@ class _Run:
     algebraic: AlgebraicRows
     solver_tolerance: float
     tolerance: float
+    exact_level: int
     progress: Callable[[float], None] | None
     matrices: OrderedDict[float, StepMatrix]
 
@@ -194,7 +200,11 @@ class _Run:
             if len(self.matrices) == KEPT:
                 self.matrices.popitem(last=False)
             self.matrices[rate] = step_matrix(
-                self.system.conductance, self.system.capacity, rate, self.solver_tolerance
+                self.system.conductance,
+                self.system.capacity,
+                rate,
+                self.solver_tolerance,
+                exact_level=self.exact_level,
             )
         self.matrices.move_to_end(rate)
         return self.matrices[rate]

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.csgraph import connected_components
 
 from etc_engine.errors import ConvergenceError, InputError
-from etc_engine.solvers.amg_cg import Preconditioner, build_preconditioner
+from etc_engine.solvers.amg_cg import EXACT_LEVEL, Preconditioner, build_preconditioner
 
 MOST_ITERATIONS = 500
 
@@ -92,6 +92,7 @@ def step_matrix(
     rate: float,
     tolerance: float,
     like: StepMatrix | None = None,
+    exact_level: int = EXACT_LEVEL,
 ) -> StepMatrix:
     """A = r C + K with a preconditioner of its own, or with that of ``like``, which has another rate.
 
@@ -113,7 +114,7 @@ def step_matrix(
             f"{nodes.size} node(s), the first of them {nodes[0]}, store no heat and are joined to nothing that has a "
             f"temperature: give them a heat capacity or leave them out"
         )
-    preconditioner = build_preconditioner(matrix) if like is None else like.preconditioner
+    preconditioner = build_preconditioner(matrix, exact_level) if like is None else like.preconditioner
     exact = like is None and preconditioner.levels == 1
     return StepMatrix(matrix, rate, preconditioner, exact, components, row_sums, tolerance)
 

@@ -1,7 +1,7 @@
 r"""Effective thermal diffusivity of a packing, from how fast it warms up.
 
-The wall at x = 0 of a packing at temperature 0 is set to 1 and the wall at x = L is insulated. A homogeneous slab of
-diffusivity a then has the mean temperature (Carslaw and Jaeger 1959, chapter III)
+The wall at x = 0 (or at x = L) of a packing at temperature 0 is set to 1 and the opposite wall is insulated. A
+homogeneous slab of diffusivity a then has the mean temperature (Carslaw and Jaeger 1959, chapter III)
 
     M(Fo) = 1 - sum_{n>=0} 8/((2n+1)^2 pi^2) exp(-(2n+1)^2 pi^2 Fo/4),      Fo = a t/L^2,
 
@@ -23,7 +23,7 @@ from etc_engine.errors import InputError
 from etc_engine.pipe.steady import pipe_conductivity
 from etc_engine.solvers.marching import march
 from etc_engine.transient.systems import SYSTEMS, Physics
-from etc_engine.walls import FixedTemperature
+from etc_engine.walls import WALLS, FixedTemperature
 
 TERMS = 200
 SHORT = 1e-4
@@ -144,6 +144,7 @@ def effective_diffusivity(
     conductivity: ArrayLike = 1.0,
     heat_capacity: ArrayLike = 1.0,
     contact_resistance: float = 0.0,
+    heated: str = "left",
     tolerance: float = 1e-4,
 ) -> Diffusivity:
     """Effective diffusivity along x of a packing between walls, by the pipe network.
@@ -156,6 +157,8 @@ def effective_diffusivity(
         As in `etc_engine.pipe.conductances.pipe_conductances`.
     heat_capacity : float or array_like, shape (n,) [J/(m3 K)]
         rho c of all particles, or of each.
+    heated : str
+        The wall of the step, ``left`` or ``right``. What is not homogeneous counts more near it: the two differ.
     tolerance : float
         Of the adaptive steps, over the step of the wall's temperature.
 
@@ -182,6 +185,8 @@ def effective_diffusivity(
     True
     """
     box = network.packing.box
+    if heated not in ("left", "right"):
+        raise InputError(f"the heated wall is left or right, found {heated!r}")
     if box.periodic[0]:
         raise InputError("the diffusivity along x is measured between two walls; the box is periodic along x")
     k = float(
@@ -197,11 +202,11 @@ def effective_diffusivity(
         raise InputError("no path of contacts leads from wall to wall: there is no effective diffusivity")
     zero = np.zeros(network.packing.count)
     physics = Physics(
-        conductivity, heat_capacity, contact_resistance, {"left": FixedTemperature(1.0)}, lambda _: zero, resistance
+        conductivity, heat_capacity, contact_resistance, {heated: FixedTemperature(1.0)}, lambda _: zero, resistance
     )
     system = SYSTEMS["pipe"](network, physics)
     labels = connected_components(system.heat.conductance, directed=False)[1]
-    joined = np.isin(labels, labels[network.wall_particles[network.walls == 0]])
+    joined = np.isin(labels, labels[network.wall_particles[network.walls == WALLS.index(heated)]])
     shares = np.where(joined, system.heat.capacity, 0.0)
     density = float(shares.sum() / box.volume)
     scale = box.lengths[0] ** 2 * density / k

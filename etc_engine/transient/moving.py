@@ -14,33 +14,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
+from etc_engine.dtem.steady import per_particle
 from etc_engine.errors import InputError
-from etc_engine.packing.particles import ParticlePacking
+from etc_engine.packing.particles import ParticlePacking, particle_values
 from etc_engine.packing.trajectory import Trajectory
-from etc_engine.solvers.marching import HeatSystem, march
+from etc_engine.solvers.marching import march
+from etc_engine.transient.systems import ParticleSystem
 
-
-class NetworkSystem(Protocol):
-    """A contact network ready to be marched, such as a `PipeTransient` or a `TransientSystem`."""
-
-    @property
-    def heat(self) -> HeatSystem:
-        """Its nodes."""
-
-    def initial(self, temperatures: NDArray[np.float64], /) -> NDArray[np.float64]:
-        """Unknowns of particles of these temperatures."""
-
-    def particle_temperatures(self, temperatures: NDArray[np.float64], /) -> NDArray[np.float64]:
-        """Mean temperatures of the particles."""
-
-
-Build = Callable[[ContactNetwork, NDArray[np.float64]], NetworkSystem]
+Build = Callable[[ContactNetwork, NDArray[np.float64]], ParticleSystem]
 """(network, heat capacity of each particle [J/(m K)]) -> system; walls, materials and sources are the builder's.
 
 The functions that make systems take rho c and multiply with the area that a method stores heat in, so a builder hands
@@ -93,8 +79,10 @@ class MovingState:
         Mean temperature of each particle.
     radii : ndarray, shape (n,) [m]
         Of the contacts from here on, thermal expansion included.
+    rates : ndarray, shape (k,) [W/m]
+        Heat flows of the system (walls, sources), with the contacts up to here.
     heat : ndarray, shape (k,) [J/m]
-        Heat flows of the system (walls, sources) integrated since the first frame.
+        The same integrated since the first frame.
     stored : float [J/m]
         sum_i C_i (T_i - T_i(0)); equal to the sum of ``heat``.
     contacts, opened, closed : int
@@ -107,6 +95,7 @@ class MovingState:
     time: float
     temperatures: NDArray[np.float64]
     radii: NDArray[np.float64]
+    rates: NDArray[np.float64]
     heat: NDArray[np.float64]
     stored: float
     contacts: int
@@ -114,6 +103,11 @@ class MovingState:
     closed: int
     steps: int
     iterations: int
+
+    @property
+    def imbalance(self) -> float:
+        """Heat stored less heat that came in [J/m]."""
+        return self.stored - float(self.heat.sum())
 
 
 def march_trajectory(
@@ -126,6 +120,7 @@ def march_trajectory(
     expansion: ThermalExpansion | None = None,
     scheme: str = "bdf2",
     steps: int = 4,
+    tolerance: float = 1e-3,
     solver_tolerance: float = 1e-10,
     restart: MovingState | None = None,
     progress: Callable[[float], None] | None = None,
@@ -149,7 +144,7 @@ def march_trajectory(
         A name of `etc_engine.solvers.marching.SCHEMES`.
     steps : int
         Steps from frame to frame; ``adaptive`` finds its own.
-    solver_tolerance : float
+    tolerance, solver_tolerance : float
         As in `etc_engine.solvers.marching.march`.
     restart : MovingState, optional
         A state of the same run, to go on from; the other arguments are still those of the start.
@@ -189,12 +184,15 @@ def march_trajectory(
     True
     """
     first = trajectory.packings[0]
-    capacities = first.measures * _of_particles(heat_capacity, first.count, "heat capacity")
-    start = _of_particles(initial, first.count, "initial temperature")
+    capacities = first.measures * per_particle(heat_capacity, first.count, "heat capacity")
+    start = particle_values(initial, first.count, "initial temperature")
     packing, network = _contacts(first, expansion, start, contacts)
     system = build(network, capacities)
-    heat = np.zeros_like(system.heat.rates(trajectory.times[0], system.initial(start)))
-    state = MovingState(0, trajectory.times[0], start, packing.radii, heat, 0.0, network.count, 0, 0, 0, 0)
+    rates = system.heat.rates(trajectory.times[0], system.initial(start))
+    none = np.zeros_like(rates)
+    state = MovingState(
+        0, float(trajectory.times[0]), start, packing.radii, rates, none, 0.0, network.count, 0, 0, 0, 0
+    )
     if restart is None:
         yield state
     else:
@@ -210,19 +208,22 @@ def march_trajectory(
             [low, high],
             scheme=scheme,
             steps=None if scheme == "adaptive" else steps,
+            tolerance=tolerance,
             solver_tolerance=solver_tolerance,
             progress=progress,
         )
         temperatures = system.particle_temperatures(ended.temperatures)
+        rates = system.heat.rates(high, ended.temperatures)
         before = network
         packing, network = _contacts(trajectory.packings[frame + 1], expansion, temperatures, contacts)
         system = build(network, capacities)
         opened, closed = _changes(before, network)
         state = MovingState(
             frame + 1,
-            high,
+            float(high),
             temperatures,
             packing.radii,
+            rates,
             state.heat + ended.heat,
             float(capacities @ (temperatures - start)),
             network.count,
@@ -249,11 +250,3 @@ def _changes(before: ContactNetwork, after: ContactNetwork) -> tuple[int, int]:
     n = before.packing.count
     old, new = (np.unique(network.pairs[:, 0] * n + network.pairs[:, 1]) for network in (before, after))
     return int(np.setdiff1d(old, new).size), int(np.setdiff1d(new, old).size)
-
-
-def _of_particles(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
-    """One value for all particles, or one for each."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (count,)) or not np.isfinite(array).all():
-        raise InputError(f"the {name} must be one finite number or {count} of them, found shape {array.shape}")
-    return np.broadcast_to(array, (count,)).copy()

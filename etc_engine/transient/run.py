@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.batch.stop import Stopped, StopRequest
 from etc_engine.box import Box, parse_periodic
 from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.errors import StudyError
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
+from etc_engine.packing.dumps import read_trajectory
 from etc_engine.packing.formats import format_to_read, read_particles
+from etc_engine.packing.trajectory import Trajectory
 from etc_engine.solvers.marching import MarchState, march
-from etc_engine.transient.states import claimed_states, write_state
+from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory
+from etc_engine.transient.states import State, claimed_states, write_state
 from etc_engine.transient.study import Gradient, NetworkStudy, plain
-from etc_engine.transient.systems import SYSTEMS, ParticleSystem, Physics
+from etc_engine.transient.systems import SYSTEMS, ParticleSystem, Physics, storing_area
 from etc_engine.walls import value_at
+
+Progress = Callable[[float], None]
+PLANAR_LEVEL = 300_000
+"""Up to so many unknowns the steps of a network of disks are factorised: it pays from the third step on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +38,17 @@ class Transient:
     ----------
     study : NetworkStudy
     network : ContactNetwork
+        At the start.
     system : ParticleSystem
-    states : list of MarchState
+        At the start.
+    states : list of MarchState, or of MovingState with [motion]
         One an output time; fewer if the run was stopped.
+    times : ndarray [s]
+        All output times.
+    trajectory : Trajectory, optional
+        With [motion].
     resumed : int
-        How many of them a former run had written.
+        How many of the states a former run had written.
     stopped : str
         The signal that ended the run, empty if it reached the end.
     """
@@ -43,43 +56,23 @@ class Transient:
     study: NetworkStudy
     network: ContactNetwork
     system: ParticleSystem
-    states: list[MarchState]
+    states: Sequence[State]
+    times: NDArray[np.float64]
+    trajectory: Trajectory | None = None
     resumed: int = 0
     stopped: str = ""
 
 
-def prepare(study: NetworkStudy, folder: Path) -> tuple[ContactNetwork, ParticleSystem, NDArray[np.float64]]:
-    """Contact network, system and initial unknowns of a study.
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """A study made ready: what its states are, and the march from one of them, or from the start."""
 
-    Parameters
-    ----------
-    study : NetworkStudy
-    folder : Path
-        Where the study file lies: its particle file is relative to it.
-
-    Raises
-    ------
-    InputError, GeometryError, PackingError
-    """
-    packing, column = _particles(study, folder)
-    network = _contacts(study, packing)
-    given = study.conduction.conductivity
-    if given is not None and column is not None:
-        raise StudyError(f"conduction.conductivity: {study.particles} has a column of that name, take one of them out")
-    physics = Physics(
-        conductivity=column if column is not None else 1.0 if given is None else given,
-        heat_capacity=np.asarray(study.material.heat_capacity, dtype=np.float64),
-        contact_resistance=study.conduction.contact_resistance,
-        walls=study.walls.conditions(),
-        source=_source(study, packing.count),
-        pipe_resistance=study.conduction.pipe_resistance or "chord",
-        dipoles=study.conduction.dipoles,
-    )
-    system = SYSTEMS[study.conduction.method](network, physics)
-    initial = study.material.initial
-    if isinstance(initial, Gradient):
-        return network, system, system.initial(initial.value + packing.centers @ np.array(initial.gradient))
-    return network, system, system.initial(initial)
+    network: ContactNetwork
+    system: ParticleSystem
+    times: NDArray[np.float64]
+    march: Callable[[State | None], Iterator[State]]
+    kind: type[MarchState] | type[MovingState]
+    trajectory: Trajectory | None = None
 
 
 def run_transient(
@@ -88,7 +81,7 @@ def run_transient(
     output: Path | None = None,
     *,
     resume: bool = False,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Transient:
     """Solve a transient study.
 
@@ -96,7 +89,7 @@ def run_transient(
     ----------
     study : NetworkStudy
     folder : Path
-        Where the study file lies.
+        Where the study file lies: its particle file is relative to it.
     output : Path, optional
         The file that is to be written; its states are kept beside it, for `resume`.
     resume : bool
@@ -112,50 +105,122 @@ def run_transient(
     ------
     InputError, GeometryError, PackingError, ConvergenceError, OutputError
     """
-    network, system, initial = prepare(study, folder)
+    course = (_still if study.motion is None else _moving)(study, folder, progress)
+    made = Transient(study, course.network, course.system, [], course.times, course.trajectory)
     if output is None:
-        return Transient(study, network, system, list(_march(study, system, initial, None, progress)))
+        return replace(made, states=list(course.march(None)))
     with (
-        claimed_states(output, _digest(study, network, system), resume=resume) as (place, states),
+        claimed_states(output, _digest(study, course), course.kind, resume=resume) as (place, found),
         StopRequest() as stop,
     ):
-        resumed, total = len(states), len(study.time.times)
-        if resumed < total:
-            marching = _march(study, system, initial, states[-1] if states else None, progress)
+        states, resumed = found, len(found)
+        if resumed < course.times.size:
+            marching = course.march(states[-1] if states else None)
             try:
-                while len(states) < total:
+                while len(states) < course.times.size:
                     states.append(stop.run(lambda: next(marching)))
                     write_state(place, len(states) - 1, states[-1])
             except Stopped:
-                return Transient(study, network, system, states, resumed, stop.reason)
-        return Transient(study, network, system, states, resumed)
+                return replace(made, states=states, resumed=resumed, stopped=stop.reason)
+        return replace(made, states=states, resumed=resumed)
 
 
-def _march(
-    study: NetworkStudy,
-    system: ParticleSystem,
-    initial: NDArray[np.float64],
-    restart: MarchState | None,
-    progress: Callable[[float], None] | None,
-) -> Iterator[MarchState]:
+def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
+    """One packing, marched over the output times."""
+    packing, column = _particles(study, folder)
+    network = _contacts(study, packing)
+    system = SYSTEMS[study.conduction.method](network, _physics(study, packing.count, column))
+    initial = system.initial(_initial(study, packing))
     time = study.time
-    begin, end = time.times[0], time.times[-1]
 
-    def told(t: float) -> None:
-        if progress is not None:
-            progress((t - begin) / (end - begin))
+    def marched(restart: State | None) -> Iterator[State]:
+        assert not isinstance(restart, MovingState)
+        return march(
+            system.heat,
+            initial,
+            time.times,
+            scheme=time.scheme,
+            step=time.step,
+            steps=time.steps,
+            tolerance=time.tolerance,
+            exact_level=PLANAR_LEVEL,
+            restart=restart,
+            progress=_fraction(progress, time.times[0], time.times[-1]),
+        )
 
-    return march(
-        system.heat,
-        initial,
-        time.times,
-        scheme=time.scheme,
-        step=time.step,
-        steps=time.steps,
-        tolerance=time.tolerance,
-        restart=restart,
-        progress=told,
+    return _Course(network, system, np.array(time.times), marched, MarchState)
+
+
+def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
+    """All frames of a dump, each with contacts of its own."""
+    motion, method, time = study.motion, study.conduction.method, study.time
+    assert motion is not None
+    assert study.particles is not None
+    path = folder / study.particles
+    if not path.exists():
+        raise StudyError(f"particles: there is no file {path}")
+    trajectory = read_trajectory(path, motion.timestep)
+    first = trajectory.packings[0]
+    if first.dimension != 2 or first.box.periodic != parse_periodic(study.periodic or first.box.periodic_axes, 2):
+        raise StudyError(f"particles: disks in a box that is periodic along {study.periodic!r} are wanted: {first.box}")
+    physics = _physics(study, first.count, trajectory.conductivity)
+
+    def build(network: ContactNetwork, capacities: NDArray[np.float64]) -> ParticleSystem:
+        heat_capacity = capacities / storing_area(network, method, physics)
+        return SYSTEMS[method](network, replace(physics, heat_capacity=heat_capacity))
+
+    def contacts(packing: ParticlePacking) -> ContactNetwork:
+        return _contacts(study, packing)
+
+    def marched(restart: State | None) -> Iterator[State]:
+        assert not isinstance(restart, MarchState)
+        return march_trajectory(
+            trajectory,
+            contacts,
+            build,
+            _initial(study, first),
+            heat_capacity=physics.heat_capacity,
+            expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
+            scheme=time.scheme,
+            steps=time.steps or 1,
+            tolerance=time.tolerance,
+            restart=restart,
+            progress=_fraction(progress, trajectory.times[0], trajectory.times[-1]),
+        )
+
+    network = contacts(first)
+    system = SYSTEMS[method](network, physics)
+    return _Course(network, system, trajectory.times, marched, MovingState, trajectory)
+
+
+def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> Physics:
+    given = study.conduction.conductivity
+    if given is not None and column is not None:
+        raise StudyError(f"conduction.conductivity: {study.particles} has a column of that name, take one of them out")
+    return Physics(
+        conductivity=column if column is not None else 1.0 if given is None else given,
+        heat_capacity=np.asarray(study.material.heat_capacity, dtype=np.float64),
+        contact_resistance=study.conduction.contact_resistance,
+        walls=study.walls.conditions(),
+        source=_source(study, count),
+        pipe_resistance=study.conduction.pipe_resistance or "chord",
+        dipoles=study.conduction.dipoles,
     )
+
+
+def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
+    initial = study.material.initial
+    if isinstance(initial, Gradient):
+        return np.asarray(initial.value + packing.centers @ np.array(initial.gradient))
+    return initial
+
+
+def _fraction(progress: Progress | None, begin: float, end: float) -> Progress | None:
+    """A progress that is told the time instead of the fraction that is done."""
+    if progress is None:
+        return None
+    tell = progress
+    return lambda t: tell((t - begin) / (end - begin))
 
 
 def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDArray[np.float64] | None]:
@@ -208,16 +273,13 @@ def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.flo
     return heat
 
 
-def _digest(study: NetworkStudy, network: ContactNetwork, system: ParticleSystem) -> str:
+def _digest(study: NetworkStudy, course: _Course) -> str:
     """Of the study, of the particles it found and of what conducts between them."""
     whole = hashlib.sha256(study.digest().encode())
-    packing = network.packing
-    for values in (
-        packing.centers,
-        packing.radii,
-        packing.box.lengths,
-        packing.box.periodic,
-        system.heat.conductance.data,
-    ):
+    packings = [course.network.packing] if course.trajectory is None else course.trajectory.packings
+    box = packings[0].box
+    arrays = [box.lengths, box.periodic, course.times, course.system.heat.conductance.data]
+    arrays += [values for packing in packings for values in (packing.centers, packing.radii)]
+    for values in arrays:
         whole.update(np.asarray(values, dtype=np.float64).tobytes())
     return whole.hexdigest()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import fields
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,9 @@ from etc_engine.batch.lock import Lock
 from etc_engine.batch.shards import clear_folder, write_atomically
 from etc_engine.errors import OutputError, StudyError
 from etc_engine.solvers.marching import MarchState
+from etc_engine.transient.moving import MovingState
 
-FIELDS = ("time", "temperatures", "heat", "stored", "steps", "iterations", "step", "older", "last_heat")
+State = MarchState | MovingState
 
 
 def state_folder(output: Path) -> Path:
@@ -34,7 +36,7 @@ def state_path(folder: Path, index: int) -> Path:
     return folder / f"state-{index:06d}.npz"
 
 
-def write_state(folder: Path, index: int, state: MarchState) -> None:
+def write_state(folder: Path, index: int, state: State) -> None:
     """Put a state in place.
 
     Raises
@@ -42,8 +44,8 @@ def write_state(folder: Path, index: int, state: MarchState) -> None:
     OutputError
     """
     buffer = BytesIO()
-    fields: dict[str, Any] = {name: np.asarray(getattr(state, name)) for name in FIELDS}
-    np.savez(buffer, **fields)
+    values: dict[str, Any] = {field.name: np.asarray(getattr(state, field.name)) for field in fields(state)}
+    np.savez(buffer, **values)
     path = state_path(folder, index)
     try:
         write_atomically(path, buffer.getvalue())
@@ -53,33 +55,23 @@ def write_state(folder: Path, index: int, state: MarchState) -> None:
         ) from None
 
 
-def read_states(folder: Path) -> list[MarchState]:
+def read_states(folder: Path, kind: type[MarchState] | type[MovingState] = MarchState) -> list[State]:
     """The states of the first output times without a gap; a damaged one ends them."""
-    states: list[MarchState] = []
+    states: list[State] = []
     while (path := state_path(folder, len(states))).exists():
         try:
             with np.load(BytesIO(path.read_bytes())) as data:
-                values = {name: data[name] for name in FIELDS}
+                values = {field.name: data[field.name] for field in fields(kind)}
         except (OSError, ValueError, KeyError, zipfile.BadZipFile):
             break
-        states.append(
-            MarchState(
-                float(values["time"]),
-                values["temperatures"],
-                values["heat"],
-                float(values["stored"]),
-                int(values["steps"]),
-                int(values["iterations"]),
-                float(values["step"]),
-                values["older"],
-                values["last_heat"],
-            )
-        )
+        states.append(kind(**{name: value if value.ndim else value.item() for name, value in values.items()}))
     return states
 
 
 @contextmanager
-def claimed_states(output: Path, digest: str, *, resume: bool) -> Iterator[tuple[Path, list[MarchState]]]:
+def claimed_states(
+    output: Path, digest: str, kind: type[MarchState] | type[MovingState], *, resume: bool
+) -> Iterator[tuple[Path, list[State]]]:
     """The locked folder of states of an output, and what is in it to go on from.
 
     Parameters
@@ -87,6 +79,8 @@ def claimed_states(output: Path, digest: str, *, resume: bool) -> Iterator[tuple
     output : Path
     digest : str
         Of the study and its particles.
+    kind : type
+        Of the states.
     resume : bool
         Whether to go on from former states; otherwise they are removed.
 
@@ -109,7 +103,7 @@ def claimed_states(output: Path, digest: str, *, resume: bool) -> Iterator[tuple
                 raise StudyError(
                     f"{folder} belongs to another study or other particles: undo the change, or --overwrite"
                 )
-            yield folder, read_states(folder)
+            yield folder, read_states(folder, kind)
         else:
             clear_folder(folder)
             write_atomically(former, digest.encode())

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from etc_engine.batch.study import ContactsTable, PackingTable
+from etc_engine.batch.study_tables import ContactsTable, PackingTable
 from etc_engine.errors import InputError, StudyError
 from etc_engine.solvers.marching import SCHEMES
 from etc_engine.transient.systems import SYSTEMS
@@ -139,7 +139,7 @@ class Time(_Table):
     """``[time]``: scheme, steps and output times; times[0] is the start."""
 
     scheme: str = "bdf2"
-    times: list[Finite] = Field(min_length=2)
+    times: list[Finite] = Field(default=[], description="of the output; with [motion] those of the frames")
     step: Positive | None = None
     steps: Annotated[int, Field(ge=1)] | None = Field(default=None, description="of each output interval")
     tolerance: Positive = Field(default=1e-3, description="of an adaptive step [K]")
@@ -148,13 +148,21 @@ class Time(_Table):
     def _check(self) -> Time:
         if self.scheme not in SCHEMES:
             raise ValueError(f"scheme: found {self.scheme!r}, allowed: {', '.join(SCHEMES)}")
-        if any(np.diff(self.times) <= 0.0):
+        if len(self.times) == 1 or any(np.diff(self.times) <= 0.0):
             raise ValueError("times: they must increase; the first one is the start")
         if self.scheme == "adaptive" and self.steps is not None:
             raise ValueError("steps: an adaptive scheme chooses them; give a tolerance")
         if self.scheme != "adaptive" and (self.step is None) == (self.steps is None):
             raise ValueError(f"scheme {self.scheme!r} needs either step, in seconds, or steps, of each output interval")
         return self
+
+
+class Motion(_Table):
+    """``[motion]``: all frames of the dump, one after the other, instead of one."""
+
+    timestep: Positive = Field(description="time of one step of the dump [s]")
+    expansion: Finite = Field(default=0.0, description="linear thermal expansion of the radii [1/K]")
+    reference: Finite = Field(default=0.0, description="temperature of the radii in the dump [K]")
 
 
 class NetworkStudy(_Table):
@@ -174,6 +182,7 @@ class NetworkStudy(_Table):
     material: Material
     walls: WallsTable = WallsTable()
     source: list[Source] = []
+    motion: Motion | None = None
     time: Time
 
     @model_validator(mode="after")
@@ -187,9 +196,28 @@ class NetworkStudy(_Table):
                 raise ValueError("[packing] makes one packing: a box of two lengths, and one density")
             if self.seed is None:
                 raise ValueError("seed: [packing] draws random numbers, give a whole number")
+        if self.motion is None and not self.time.times:
+            raise ValueError("time.times: missing, expected the output times; the first one is the start")
+        if self.motion is not None:
+            self._check_motion(self.motion)
         if len(self.contacts.contact_angle or (0.0,)) != 1:
             raise ValueError("contacts.contact_angle: a transient has one half-angle")
         return self
+
+    def _check_motion(self, motion: Motion) -> None:
+        """Frames of a dump, and their times."""
+        if self.particles is None or self.frame is not None or self.box is not None:
+            raise ValueError(
+                "motion: it takes all frames of a dump, whose name is in particles, and the dump's own box"
+            )
+        if self.time.times:
+            raise ValueError("time.times: with [motion] the output times are those of the frames, take them out")
+        if self.time.scheme != "adaptive" and self.time.steps is None:
+            raise ValueError("time.steps: with [motion] give the steps from frame to frame, or scheme = 'adaptive'")
+        if self.conduction.dipoles:
+            raise ValueError("conduction.dipoles: how a disk turns from frame to frame is not known, take it out")
+        if motion.expansion != 0.0 and self.contacts.rule != "overlap":
+            raise ValueError("motion.expansion: radii change the contacts of rule = 'overlap' only")
 
     def resolved(self) -> dict[str, Any]:
         """The study with all defaults written out, as plain JSON values."""

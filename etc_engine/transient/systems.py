@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
+from etc_engine.dtem.storage import stored_areas
 from etc_engine.dtem.transient import transient_system
+from etc_engine.pipe.conductances import PIPE_RESISTANCES
 from etc_engine.pipe.transient import pipe_transient
 from etc_engine.solvers.marching import HeatSystem
 from etc_engine.walls import WallCondition
@@ -83,6 +85,11 @@ def _elements(network: ContactNetwork, physics: Physics, *, method: str) -> Part
         contact_resistance=physics.contact_resistance,
         source=physics.source,
     )
+
+
+def storing_area(network: ContactNetwork, method: str, physics: Physics) -> NDArray[np.float64]:
+    """Area in which a method stores heat, of each particle, shape (n,) [m2]."""
+    return stored_areas(network, PIPE_RESISTANCES[physics.pipe_resistance] if method == "pipe" else method)
 
 
 SYSTEMS: Mapping[str, Callable[[ContactNetwork, Physics], ParticleSystem]] = {

@@ -12,10 +12,14 @@ from etc_engine.box import AXES
 from etc_engine.errors import InputError
 from etc_engine.voxel.conductivity import VoxelConductivity, voxel_conductivity
 from etc_engine.voxel.green import GradientProjection, gradient_projection
-from etc_engine.voxel.iterations import LoadSolution, solve_conjugate_gradients, solve_eyre_milton
+from etc_engine.voxel.iterations import LoadSolution, Projection, solve_conjugate_gradients, solve_eyre_milton
+from etc_engine.voxel.walls import WallProjection, wall_projection
 
 SOLVERS = ("cg", "eyre-milton")
 BOUNDARIES = ("periodic", "walls")
+NOTHING = 1e-14
+"""A conductivity below this part of the largest counts as 0."""
+
 SINGULAR = 1e-11
 """Part of the largest resistivity below which perfect conductors are said to join across the cell."""
 
@@ -33,7 +37,7 @@ class CellSolution:
     solver_error : float
         Largest estimated relative error that the solver left of a load.
     gradients : tuple of ndarray, shape (d, n1, n2[, n3]) [1/m]
-        Where asked for: the temperature gradient under a unit mean gradient along each axis.
+        Where asked for: the temperature gradient under a unit mean gradient along each axis wanted.
     """
 
     tensor: NDArray[np.float64]
@@ -52,6 +56,7 @@ def solve_cell(
     tolerance: float = 1e-8,
     threads: int = 1,
     limit: int = 5000,
+    axes: tuple[int, ...] | None = None,
     keep_gradients: bool = False,
 ) -> CellSolution:
     r"""Effective conductivity tensor of an image of any number of phases.
@@ -62,12 +67,12 @@ def solve_cell(
     Parameters
     ----------
     conductivity : array_like, shape (n1, n2[, n3]) or (n1, n2[, n3], d, d) [W/(m K)]
-        A number or a symmetric tensor for each voxel. Numbers may be 0, or inf (with ``cg``), but not both in one image.
+        A number or a symmetric tensor for each voxel. Numbers may be 0, or inf (with ``cg``), but not both together.
     lengths : sequence of float [m]
         Edges of the cell.
     boundary : str
-        ``periodic``; or ``walls``: along each axis between two isothermal faces, the others adiabatic, which is
-        the periodic cell of the image and its mirror images (2^d times the voxels).
+        ``periodic``; or ``walls``: along each axis between two isothermal faces, the others adiabatic. That is the
+        periodic cell of the image and its mirror images, solved by sines and cosines at the size of the image.
     solver : str
         ``cg`` or ``eyre-milton``.
     green : str
@@ -78,6 +83,8 @@ def solve_cell(
         Threads of the FFT; the result does not depend on them.
     limit : int
         Most iterations of a load.
+    axes : tuple of int, optional
+        Load axes wanted, all by default; components between others are NaN.
     keep_gradients : bool
         Whether the gradient fields are answered too.
 
@@ -106,23 +113,29 @@ def solve_cell(
     image = voxel_conductivity(conductivity)
     d = len(image.shape)
     _check(image, lengths, boundary, solver, tolerance, threads)
-    if boundary == "walls":
-        image = image.mirrored()
-        lengths = [2.0 * length for length in lengths]
     spacing = tuple(length / count for length, count in zip(lengths, image.shape, strict=True))
-    projection = gradient_projection(image.shape, spacing, green, threads)
     perfect = bool(np.isinf(image.extremes()[1]))
-    if perfect:
-        tensor, loads = _solve_fluxes(image, projection, tolerance, limit)
-    else:
-        tensor, loads = _solve_gradients(image, projection, solver, tolerance, limit, keep_gradients)
-    if boundary == "walls":
-        tensor = np.where(np.eye(d, dtype=bool), tensor, np.nan)
+    wanted = tuple(range(d)) if axes is None else axes
+    tensor, loads = np.full((d, d), np.nan), []
+    for group in (wanted,) if boundary == "periodic" else tuple((axis,) for axis in wanted):
+        projection: GradientProjection | WallProjection
+        if boundary == "periodic":
+            projection = gradient_projection(image.shape, spacing, green, threads)
+        else:
+            projection = wall_projection(image.shape, spacing, group[0], green, threads)
+        if perfect:
+            part, found = _solve_fluxes(image, projection, group, tolerance, limit)
+        else:
+            part, found = _solve_loads(
+                image, projection.onto_gradients, group, solver, tolerance, limit, keep_gradients
+            )
+        known = np.ix_(group, group)
+        tensor[known] = part[known]
+        loads += found
     kept: tuple[NDArray[np.float64], ...] = ()
     if keep_gradients and not perfect:
-        inside = (slice(None), *(slice(n // 2 if boundary == "walls" else n) for n in image.shape))
         kept = tuple(
-            load.fluctuation[inside] + np.eye(d)[axis].reshape(d, *(1,) * d) for axis, load in enumerate(loads)
+            load.fluctuation + np.eye(d)[axis].reshape(d, *(1,) * d) for axis, load in zip(wanted, loads, strict=True)
         )
     return CellSolution(tensor, max(load.iterations for load in loads), max(load.error for load in loads), kept)
 
@@ -145,7 +158,8 @@ def _check(
     if min(image.shape) < 2:
         raise InputError(f"an image needs at least 2 voxels along each axis, found {image.shape}")
     least, largest = image.extremes()
-    perfect, insulates = bool(np.isinf(largest)), least <= 1e-14 * largest and np.isfinite(largest) or least == 0.0
+    perfect = bool(np.isinf(largest))
+    insulates = least == 0.0 or (not perfect and least <= NOTHING * largest)
     if largest == 0.0:
         raise InputError("no voxel of the image conducts: at least one needs a conductivity above 0")
     if perfect and insulates:
@@ -161,51 +175,59 @@ def _check(
         )
 
 
-def _solve_gradients(
-    image: VoxelConductivity,
-    projection: GradientProjection,
+def _solve_loads(
+    conductivity: VoxelConductivity,
+    project: Projection,
+    axes: tuple[int, ...],
     solver: str,
     tolerance: float,
     limit: int,
-    keep: bool,
+    keep: bool = False,
 ) -> tuple[NDArray[np.float64], list[LoadSolution]]:
     """A load along each axis. The energy of two loads is the flux of one and its imbalance in the other's gradient."""
-    d = len(image.shape)
+    d = len(conductivity.shape)
     solve = solve_conjugate_gradients if solver == "cg" else solve_eyre_milton
-    tensor, loads = np.zeros((d, d)), []
-    single: list[NDArray[np.float32]] = []  # enough for a correction of second order
-    for axis in range(d):
-        load = solve(image, projection.onto_gradients, np.eye(d)[axis], tolerance, limit)
-        tensor[:, axis] = load.flux
-        if load.imbalance is not None:
-            for earlier, other in enumerate(single):
-                energy = load.flux[earlier] - np.vdot(other, load.imbalance.astype(np.float32)) / image.scalars.size
-                tensor[earlier, axis] = tensor[axis, earlier] = energy
-            single.append(load.fluctuation.astype(np.float32))
-        none = np.zeros(0)
-        loads.append(LoadSolution(load.flux, load.fluctuation if keep else none, None, load.iterations, load.error))
-    return 0.5 * (tensor + tensor.T), loads
+    tensor = np.full((d, d), np.nan)
+    loads: list[LoadSolution] = []
+    single: dict[int, NDArray[np.float32]] = {}  # enough for a correction of second order
+    for axis in axes:
+        load = solve(conductivity, project, np.eye(d)[axis], tolerance, limit)
+        tensor[axis, axis] = load.flux[axis]
+        for earlier in axes[: len(loads)]:
+            component = load.flux[earlier]
+            if load.imbalance is None:
+                component = 0.5 * (component + loads[axes.index(earlier)].flux[axis])
+            else:
+                imbalance = load.imbalance.astype(np.float32)
+                component -= np.vdot(single[earlier], imbalance) / conductivity.scalars.size
+            tensor[earlier, axis] = tensor[axis, earlier] = component
+        if load.imbalance is not None and axis != axes[-1]:
+            single[axis] = load.fluctuation.astype(np.float32)
+        fluctuation = load.fluctuation if keep else np.zeros(0)
+        loads.append(LoadSolution(load.flux, fluctuation, None, load.iterations, load.error))
+    return tensor, loads
 
 
 def _solve_fluxes(
-    image: VoxelConductivity, projection: GradientProjection, tolerance: float, limit: int
+    image: VoxelConductivity,
+    projection: GradientProjection | WallProjection,
+    axes: tuple[int, ...],
+    tolerance: float,
+    limit: int,
 ) -> tuple[NDArray[np.float64], list[LoadSolution]]:
     """Mean fluxes along each axis through the resistivities, which vanish in perfect conductors."""
     d = len(image.shape)
     with np.errstate(divide="ignore"):  # scalars of anisotropic voxels are not used and may be 0
         resistivity = image.of(np.reciprocal)
-    loads = []
-    columns = np.zeros((d, d))
-    for axis in range(d):
-        load = solve_conjugate_gradients(resistivity, projection.onto_fluxes, np.eye(d)[axis], tolerance, limit)
-        columns[:, axis] = load.flux
-        loads.append(LoadSolution(load.flux, np.zeros(0), None, load.iterations, load.error))
-    columns = 0.5 * (columns + columns.T)
-    values = np.linalg.eigvalsh(columns)
-    if values[0] <= SINGULAR * float(np.diag(resistivity.mean()).max()):
-        axis = AXES[int(np.argmin(np.diag(columns)))]
+    if isinstance(projection, GradientProjection):
+        axes = tuple(range(d))  # the inverse takes them all
+    found, loads = _solve_loads(resistivity, projection.onto_fluxes, axes, "cg", tolerance, limit)
+    known = np.ix_(axes, axes)
+    if np.linalg.eigvalsh(found[known])[0] <= SINGULAR * float(np.diag(resistivity.mean()).max()):
+        along = AXES[axes[int(np.argmin(np.diag(found[known])))]]
         raise InputError(
-            f"perfect conductors (inf) join across the cell along {axis}: the effective conductivity is infinite; "
+            f"perfect conductors (inf) join across the cell along {along}: the effective conductivity is infinite; "
             "give them a finite conductivity"
         )
-    return np.linalg.inv(columns), loads
+    found[known] = np.linalg.inv(found[known])
+    return found, loads

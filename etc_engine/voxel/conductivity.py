@@ -69,21 +69,6 @@ class VoxelConductivity:
         _apply(self.scalars.ravel(), self.rows, self.tensors, field.reshape(d, -1), product.reshape(d, -1))
         return product
 
-    def mirrored(self) -> VoxelConductivity:
-        """The cell and its mirror images, in a cell twice as long along every axis."""
-        scalars, rows, principal, axes = self.scalars, self.rows, self.principal, self.axes
-        for axis in range(self.scalars.ndim):
-            places = np.array(np.unravel_index(rows, scalars.shape))
-            images = places.copy()
-            images[axis] = 2 * scalars.shape[axis] - 1 - places[axis]
-            scalars = np.concatenate((scalars, np.flip(scalars, axis)), axis=axis)
-            rows = np.ravel_multi_index(tuple(np.concatenate((places, images), axis=1)), scalars.shape)
-            turned = axes.copy()
-            turned[:, axis] *= -1.0
-            principal, axes = np.concatenate((principal, principal)), np.concatenate((axes, turned))
-        order = np.argsort(rows, kind="stable")
-        return VoxelConductivity(scalars, rows[order], principal[order], axes[order])
-
 
 def voxel_conductivity(values: ArrayLike | VoxelConductivity) -> VoxelConductivity:
     """Conductivities of an image, one number or one tensor per voxel, checked.

@@ -182,7 +182,7 @@ def solve_conjugate_gradients(
 
 @njit(cache=True)
 def _reflect(tau, image, gradients, drive):  # type: ignore[no-untyped-def]
-    """tau <- drive + image - 2 gradients; the squares of its change and of itself."""
+    """Replace tau by drive + image - 2 gradients; the squares of its change and of itself."""
     change, norm = 0.0, 0.0
     for a in range(tau.shape[0]):
         for i in range(tau.shape[1]):

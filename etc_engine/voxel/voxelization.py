@@ -12,7 +12,7 @@ from etc_engine.composite import Composite
 from etc_engine.errors import InputError
 
 # the sphere or disk within half-spaces, which the exact union of a packing is made of
-from etc_engine.packing.structure import NODES, _cut_disk_area, _cut_sphere_volume, _cuts
+from etc_engine.packing.structure import GAUSS_NODES, cut_disk_area, cut_sphere_volume, particle_cuts
 from etc_engine.voxel.conductivity import VoxelConductivity
 from etc_engine.voxel.fractions import ball_in_box
 
@@ -70,6 +70,13 @@ def grid_shape(lengths: tuple[float, ...], resolution: int) -> tuple[int, ...]:
     return tuple(max(round(resolution * length / shortest), resolution) for length in lengths)
 
 
+def smallest_diameter(composite: Composite, resolution: int) -> float:
+    """Diameter of the smallest inclusion in voxels."""
+    box = composite.inclusions.box
+    step = max(length / n for length, n in zip(box.lengths, grid_shape(box.lengths, resolution), strict=True))
+    return 2.0 * float(composite.inclusions.radii.min()) / step
+
+
 def check_resolution(composite: Composite, resolution: int) -> None:
     """Refuse a grid with fewer than `FEWEST` voxels across the smallest inclusion.
 
@@ -77,14 +84,13 @@ def check_resolution(composite: Composite, resolution: int) -> None:
     ------
     InputError
     """
-    box = composite.inclusions.box
-    step = max(length / n for length, n in zip(box.lengths, grid_shape(box.lengths, resolution), strict=True))
-    diameter = 2.0 * float(composite.inclusions.radii.min())
-    if diameter < FEWEST * step * (1.0 - 1e-12):
-        needed = int(np.ceil(FEWEST * min(box.lengths) / diameter))
+    spanned = smallest_diameter(composite, resolution)
+    if spanned < FEWEST * (1.0 - 1e-12):
+        diameter = 2.0 * float(composite.inclusions.radii.min())
+        needed = int(np.ceil(FEWEST * min(composite.inclusions.box.lengths) / diameter))
         raise InputError(
             f"resolution {resolution} is too coarse: the smallest inclusion, of diameter {diameter:.6g}, spans "
-            f"{diameter / step:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
+            f"{spanned:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
         )
 
 
@@ -116,8 +122,8 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     Notes
     -----
     Fractions are exact: in closed form where one surface crosses a voxel; where the radical plane of two overlapping
-    inclusions does too (that is where `Composite` divides them), by the kernels behind the exact solid fraction. A voxel
-    with pieces f_i of several inclusions is one laminate of all their phases and the matrix, normal to the
+    inclusions does too (that is where `Composite` divides them), by the kernels behind the exact solid fraction. A
+    voxel with pieces f_i of several inclusions is one laminate of all their phases and the matrix, normal to the
     principal axis of :math:`\sum f_i (1 - f_i) n_i n_i^T`: right for the thin layer of matrix between two inclusions.
     A voxel that holds part of an insulator (a perfect conductor) is isotropic with the mean conductivity (mean
     resistivity) instead: no heat crosses the interface, so that nothing is gained by a laminate that insulates
@@ -143,7 +149,7 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
         raise InputError(f"a grid has at least 2 voxels along an edge, found a resolution of {resolution}")
     shape = grid_shape(composite.inclusions.box.lengths, resolution)
     pieces = _find_pieces(composite, shape)
-    fractions = np.bincount(pieces.voxel, pieces.fraction, pieces.owner.size)
+    fractions = np.bincount(pieces.voxel, pieces.fraction, pieces.owner.size).astype(np.float64)
     fractions[pieces.owner >= 0] = 1.0
     scalars = np.append(composite.inclusion, composite.matrix)[pieces.owner]
     if voxels == "binary":
@@ -161,10 +167,10 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
 
 def _find_pieces(composite: Composite, shape: tuple[int, ...]) -> _Pieces:
     inclusions = composite.inclusions
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
     angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
     steps = np.asarray(inclusions.box.lengths) / np.asarray(shape)
-    starts, normals, cuts = _cuts(inclusions)
+    starts, normals, cuts = particle_cuts(inclusions)
     owner, count, voxel, inclusion, fraction, normal, central = _walk(
         inclusions.centers,
         inclusions.radii,
@@ -210,7 +216,7 @@ def _laminates(
     largest = least.copy()
     np.minimum.at(least, of, k)
     np.maximum.at(largest, of, k)
-    principal = np.repeat(parallel[:, None], d, axis=1)
+    principal = np.repeat(parallel[:, None], d, axis=1).astype(np.float64)
     principal[:, 0] = np.where(least > 0.0, np.minimum(series, parallel), parallel)
     principal[np.isinf(largest)] = series[np.isinf(largest), None]
     return rows, principal, axes
@@ -328,5 +334,5 @@ def _share(radius, low, high, normals, cuts, volume, angles, shares):  # type: i
             planes[crossing], distances[crossing] = normals[m], cuts[m]
             crossing += 1
     if d == 2:
-        return min(_cut_disk_area(radius, planes, distances) / volume, 1.0)
-    return min(_cut_sphere_volume(radius, planes, distances, angles, shares) / volume, 1.0)
+        return min(cut_disk_area(radius, planes, distances) / volume, 1.0)
+    return min(cut_sphere_volume(radius, planes, distances, angles, shares) / volume, 1.0)

@@ -154,12 +154,12 @@ def draw(path: Path, results: dict[tuple[str, str], Inside]) -> None:
         row[1].loglog(FOURIER, away, color=INK, linewidth=1.6, label="farthest contact from the true mean")
         row[1].set_title("largest error of a contact, and (dotted) of the mean", fontsize=10, loc="left")
         row[1].set_ylabel("error, wall stepped by 1 K [K]", fontsize=9)
-        row[1].set_ylim(1e-5, 2.0)
+        row[1].set_ylim(2e-6, 2.0)
         for axes in row:
             style(axes)
             axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$", fontsize=9)
         row[0].legend(fontsize=7.5, frameon=False)
-    grid[0, 1].legend(fontsize=7.5, frameon=False)
+    grid[0, 1].legend(fontsize=7.5, frameon=False, loc="lower left")
     save(figure, path)
 
 

@@ -108,7 +108,7 @@ def draw(
     axes = figure.add_subplot(grid[1, :2])
     axes.axhline(still, color="grey", linestyle="--", linewidth=1.0, label="frames held still, pipe network")
     axes.errorbar(PECLET, means, errors, marker="o", markersize=4, capsize=2, label="sheared")
-    axes.set(xscale="log", yscale="log", xlabel="Peclet number (shear rate R² / diffusivity) [-]")
+    axes.set(xscale="log", ylim=(0.3, 0.4), xlabel="Peclet number (shear rate R² / diffusivity) [-]")
     axes.set_ylabel("conductivity across, over that of the disks [-]")
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, fontsize=8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import xarray
 
 from etc_engine.batch.study import read_study
+from etc_engine.transient.study import parse_study as parse_network_study
 
 ROOT = Path(__file__).parents[2]
 STAND_IN = ROOT / "tests" / "stand_in.py"
@@ -30,14 +32,21 @@ realizations = {realizations}
 """
 
 
-SWEEPS = [path for path in sorted(ROOT.glob("studies/*/*.toml")) if "\n[packing]" in path.read_text()]
-"""The others are for the command `transient`, which has tables of its own."""
+FILES = sorted(ROOT.glob("studies/*/*.toml"))
+SWEEPS = [path for path in FILES if "\nkind = " not in path.read_text()]
+NETWORKS = [path for path in FILES if '\nkind = "network"' in path.read_text()]
+"""The others are meshless, see test_transient.py."""
 
 
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_a_study_file_is_valid(path):
     study, _ = read_study(path)
     assert study.name.startswith(path.parent.name)
+
+
+@pytest.mark.parametrize("path", NETWORKS, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_a_transient_study_file_is_valid(path):
+    assert parse_network_study(tomllib.loads(path.read_text())).name.startswith(path.parent.name)
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from etc_engine.batch.dataset import differing_variables
 from etc_engine.figures.transient import pick_times
 from etc_engine.pipe.steady import pipe_conductivity
 from etc_engine.solvers.marching import SCHEMES
-from etc_engine.transient.run import prepare, run_transient
+from etc_engine.transient.run import run_transient
 from etc_engine.transient.states import read_states, state_folder, state_path, write_state
 from etc_engine.transient.study import parse_study
 
@@ -282,7 +282,7 @@ def test_missing_files_and_misplaced_options(etc_engine, tmp_path):
 def test_the_uniform_pipe_is_another_system(tmp_path):
     study = parse_study(tomllib.loads(STUDY))
     uniform = parse_study(tomllib.loads(STUDY.replace('"pipe"', '"pipe"\npipe_resistance = "uniform"')))
-    chord, other = prepare(study, tmp_path)[1], prepare(uniform, tmp_path)[1]
+    chord, other = (run_transient(words, tmp_path).system for words in (study, uniform))
     assert other.heat.conductance.diagonal().max() < chord.heat.conductance.diagonal().max()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tomllib
 
 import numpy as np
@@ -67,6 +68,43 @@ def test_the_figure_has_the_numbers_of_the_result(real, finished):
             np.testing.assert_array_equal(one[key], cell[name].values)
         assert one["count"] == [3, 3]
     assert {"maxwell", "hashin_shtrikman_upper"} <= {model["name"] for model in curve["models"]}
+
+
+COMPOSITE = """schema = 1
+name = "composite"
+seed = 271828
+[packing]
+method = "random-sequential"
+radii = "equal"
+box = [1.0, 1.0]
+periodic = "xy"
+count = 9
+density = [0.1, 0.2]
+[conduction]
+engine = "voxel"
+tolerance = 1e-6
+[composite]
+contrast = [2.0, 10.0]
+resolution = 40
+[statistics]
+realizations = 2
+"""
+
+
+def test_a_composite_is_swept_over_contrasts(real):
+    study = client.submit(real.server, COMPOSITE)["id"]
+    ended = client.wait(real.server, study, interval=0.05)
+    assert ended["state"] == "done", ended
+    curve = json.loads(ask(f"{real.url}/api/studies/{study}/curve")[2])
+    statistics = simulated(client.fetch(real.server, study))
+    assert [one["contrast"] for one in curve["series"]] == [2.0, 10.0]
+    for one in curve["series"]:
+        np.testing.assert_array_equal(one["mean"], statistics["conductivity_mean"].sel(contrast=one["contrast"]).values)
+    maxwell = next(model for model in curve["models"] if model["name"] == "maxwell")
+    assert len(maxwell["curves"]) == 2
+    for values, contrast in zip(maxwell["curves"], (2.0, 10.0), strict=True):
+        beta, fraction = (contrast - 1.0) / (contrast + 1.0), curve["solid_fraction"][0]
+        assert values[0] == pytest.approx((1.0 + beta * fraction) / (1.0 - beta * fraction), rel=1e-9)
 
 
 def test_the_report_is_a_page_that_may_run_nothing(real, finished):
@@ -206,7 +244,7 @@ def test_unknown_studies_and_files_are_404(service):
 
 
 def test_cancel_resume_and_remove(tmp_path):
-    environment = {"ETC_TEST_SECONDS": "0.8"}
+    environment = {"ETC_TEST_SECONDS": "0.6"}
     with Service(tmp_path / "data", slow=True, environment=environment) as service:
         server = service.server
         running, waiting = client.submit(server, STUDY)["id"], client.submit(server, renamed("second"))["id"]
@@ -239,12 +277,12 @@ def test_cancel_resume_and_remove(tmp_path):
 
 
 def test_a_time_limit_ends_a_study_and_says_so(tmp_path):
-    options = {"limits": {"study_seconds": 2.5}}
+    options = {"limits": {"study_seconds": 1.5}}
     with Service(tmp_path / "data", options, {"ETC_TEST_SECONDS": "2"}, slow=True) as service:
         study = client.submit(service.server, STUDY)["id"]
         ended = client.wait(service.server, study, interval=0.1)
         assert ended["state"] == "failed"
-        assert "time limit of this service, 2.5 s" in ended["reason"]
+        assert "time limit of this service, 1.5 s" in ended["reason"]
 
 
 @pytest.mark.parametrize(
@@ -267,6 +305,14 @@ def test_a_refused_batch_fails_with_its_own_words(tmp_path):
         ended = client.wait(service.server, study, interval=0.05)
         assert ended["state"] == "failed"
         assert "is a folder" in ended["reason"]
+
+
+def test_a_batch_that_always_dies_is_given_up_and_says_so(tmp_path):
+    deadly = [sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"]
+    with Service(tmp_path / "data", {"engine": deadly}) as service:
+        ended = client.wait(service.server, client.submit(service.server, STUDY)["id"], interval=0.05)
+        assert (ended["state"], ended["reason"]) == ("failed", "its batch ended with status -9, see the log")
+        assert ended["log"].count("== start") == 3
 
 
 def test_the_client_names_what_is_not_there():

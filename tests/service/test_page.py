@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from browser import MISSING, Browser
+from browser import ELEMENT, MISSING, Browser
 from serving import STUDY, Service, ask, renamed, until
 
 from etc_engine.service import client
@@ -60,16 +60,18 @@ def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
     browser.write(written("packing.radii"), "uniform:0.2")
     assert "uniform" in problem_beside(browser, "packing.radii")
     browser.write(written("packing.radii"), "uniform:0.03:0.06")
-    browser.write(written("statistics.realizations"), "8")
-    browser.until("return document.getElementById('size').innerText.startsWith('24 packings, 48 results')")
+    browser.write(written("statistics.realizations"), "5")
+    browser.until("return document.getElementById('size').innerText.startsWith('15 packings, 30 results')")
     assert browser.run("return document.querySelectorAll('[aria-invalid]').length") == 0
     browser.click("#submit")
     browser.until("return location.hash.startsWith('#/study/')")
     first = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length ? w : null")
     assert browser.text("main .state") == "running"
-    assert 0 < browser.run("return document.querySelector('main progress').value") < 24
+    assert 0 < browser.run("return document.querySelector('main progress').value") < 15
     browser.until("return document.querySelector('main .state').innerText === 'done'")
-    last = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length === 2 ? w : null")
+    browser.until("return document.querySelector('figcaption').innerText.startsWith('Mean over 15 packings, with')")
+    last = browser.run(BANDS)
+    assert len(last) == 2
     assert sum(last) > sum(first)  # bands over all three densities at the end, over those with two realizations before
     assert browser.run("return document.querySelectorAll('tbody tr').length") >= 3 + 2  # values and models
     study = browser.run("return location.hash.split('/')[2]")
@@ -100,6 +102,28 @@ def test_nothing_hangs_over_and_everything_has_a_name(slow, browser, width, sche
         assert browser.run(CONTRAST) == [], part
     browser.resize(1280, 900)
     browser.prefer("light")
+
+
+def test_the_form_follows_the_engine(slow, browser):
+    """A composite has a matrix and no contacts; what has no meaning is neither shown nor sent."""
+    shown = "return [...document.querySelectorAll('.field')].filter(f => f.offsetParent).map(f => f.dataset.field)"
+    choose = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))"
+    browser.open("about:blank")
+    browser.open(slow.url)
+    assert "contacts.contact_angle" in browser.until(shown)
+    for field, word in (("packing.method", "lubachevsky-stillinger"), ("conduction.engine", "voxel")):
+        browser.run(choose, {ELEMENT: browser.find(written(field))}, word)
+    fields = browser.run(shown)
+    assert {"composite.contrast", "composite.resolution"} <= set(fields)
+    assert not any(field.startswith("contacts.") or field == "composite.nodes" for field in fields)
+    browser.write(written("packing.periodic"), "xy")
+    browser.write(written("packing.radii"), "equal:0.05")
+    browser.write(written("packing.density"), "0.2, 0.3")
+    browser.write(written("composite.resolution"), "2")
+    assert "at least 4" in problem_beside(browser, "composite.resolution")
+    browser.write(written("composite.resolution"), "32")
+    browser.write(written("models.names"), "maxwell")
+    browser.until("return document.getElementById('size').innerText.startsWith('40 packings, 40 results')")
 
 
 def test_a_pasted_study_is_refused_then_taken_and_cancelled(slow, browser):

@@ -17,6 +17,7 @@ ORDER = (
     ("packing",),
     ("contacts", "composite"),
     ("percolation",),
+    ("tensor",),
     ("dtem", "lattice", "voxel", "meshless"),
     ("pipe",),  # its pipes have the self-resistances of dtem, and store heat in the same areas
     ("effective",),
@@ -36,6 +37,9 @@ KEEPERS = {
     "matplotlib": {"figures"},
     "pyamg": {"solvers"},
     "click": {"cli"},
+    "fastapi": {"service"},
+    "starlette": {"service"},
+    "uvicorn": {"service/server.py"},
 }
 
 

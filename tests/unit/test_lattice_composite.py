@@ -13,7 +13,9 @@ from etc_engine.lattice.homogenize import composite_lattice, homogenize_lattice
 from etc_engine.lattice.phases import find_phases, phase_conductivity
 from etc_engine.lattice.tessellation import laguerre_facets
 from etc_engine.models.arrays import fcc, simple_cubic
+from etc_engine.packing.lubachevsky_stillinger import compress
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.voxel.homogenize import homogenize_voxel
 
 CUBE = Box((1.0, 1.0, 1.0), (True, True, True))
 CENTRE = [[0.5, 0.5, 0.5]]
@@ -42,7 +44,7 @@ def rng(seed: int = 307) -> np.random.Generator:
 def test_fitted_cells_have_the_exact_volume(composite):
     seeds = fitted_seeds(composite, 1500, rng())
     volumes = laguerre_facets(seeds.packing).volumes
-    assert volumes[seeds.owner != MATRIX].sum() == pytest.approx(composite.volume_fraction, rel=1e-7)
+    assert volumes[seeds.owner != MATRIX].sum() == pytest.approx(composite.volume_fraction, rel=1e-6)
     assert seeds.packing.count == pytest.approx(1500, rel=0.1)
 
 
@@ -65,7 +67,7 @@ def test_simple_cubic_array_is_met(contrast, boundary):
     exact = float(simple_cubic(1.0, contrast, 4.0 * np.pi / 81.0))
     assert np.diag(made.tensor) == pytest.approx(exact, rel=1.5e-3)
     assert made.relative_error_estimate < 6e-3
-    assert made.volume_fraction == pytest.approx(4.0 * np.pi / 81.0, rel=1e-6)
+    assert made.volume_fraction == pytest.approx(4.0 * np.pi / 81.0, rel=2e-6)
 
 
 def test_face_centred_cubic_array_converges_with_order_two():
@@ -76,6 +78,18 @@ def test_face_centred_cubic_array_converges_with_order_two():
     ]
     assert errors[1] < 1.5e-3
     assert errors[1] < 0.5 * errors[0]  # half the spacing
+
+
+@pytest.mark.parametrize(("contrast", "boundary"), [(7.7, "walls"), (0.05, "periodic")])
+def test_random_spheres_conduct_as_by_fft(contrast, boundary):
+    """An independent method under the same conditions; both are within their error estimates."""
+    packing = compress(np.ones(8), CUBE, rng(31), density=0.3).packing
+    composite = Composite(packing, 1.0, contrast)
+    lattice = homogenize_lattice(composite, rng=rng(), particles=8000, boundary=boundary)
+    fft = homogenize_voxel(composite, resolution=32, boundary=boundary)
+    difference = np.abs(np.diag(lattice.tensor) / np.diag(fft.tensor) - 1.0).max()
+    assert difference < 6e-3
+    assert difference < lattice.relative_error_estimate + fft.relative_error_estimate
 
 
 def test_a_matrix_of_inclusions_is_homogeneous():
@@ -97,6 +111,21 @@ def test_an_infinite_interface_resistance_insulates():
     sealed = homogenize_lattice(spheres(CENTRE, 0.3, 5.0), rng=rng(), particles=1000, interface_resistance=1e9)
     void = homogenize_lattice(spheres(CENTRE, 0.3, 0.0), rng=rng(), particles=1000)
     np.testing.assert_allclose(sealed.tensor, void.tensor, atol=1e-6)
+
+
+def test_what_others_cover_does_not_count():
+    nested = Composite(ParticlePacking(CENTRE * 2, [0.3, 0.15], CUBE), 1.0, [5.0, 1000.0])
+    made = homogenize_lattice(nested, rng=rng(), particles=1000)
+    assert made.volume_fraction == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=2e-6)
+    assert np.diag(made.tensor) == pytest.approx(float(simple_cubic(1.0, 5.0, 0.036 * np.pi)), rel=0.005)
+
+
+@pytest.mark.parametrize("box", [CUBE, Box((1.0, 1.0, 1.0))])
+def test_inclusions_apart_in_an_insulating_matrix_conduct_nothing(box):
+    isolated = Composite(ParticlePacking(CENTRE, [0.3], box), 0.0, 5.0)
+    made = homogenize_lattice(isolated, rng=rng(), particles=600)
+    assert np.abs(np.diag(made.tensor)).max() < 1e-9
+    assert made.relative_error_estimate == 0.0
 
 
 def test_the_contact_lattice_is_calibrated_on_itself():
@@ -141,7 +170,10 @@ def test_voxels_make_layers_that_conduct_as_exactly_as_they_are_drawn():
         (lambda: phase_conductivity(np.array([0, 0]), [1.0, 2.0]), "phase 1 is empty"),
         (lambda: phase_conductivity(np.array([0, 1]), [1.0, -2.0]), "positive and finite"),
         (lambda: phase_conductivity(np.array([0, 3]), [1.0, 2.0]), "phase 3 has no conductivity"),
-        (lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2), dtype=int)), r"three-dimensional array of integers, found shape \(2, 2\)"),
+        (
+            lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2), dtype=int)),
+            r"three-dimensional array of integers, found shape \(2, 2\)",
+        ),
         (lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2, 2))), "of integers"),
         (lambda: find_phases([[0.1] * 3], CUBE, lambda x: x[:, 0]), "whole phase number"),
         (lambda: spheres([[1.5, 0.5, 0.5]], 0.1, box=Box((1.0, 1.0, 1.0))), "outside the box"),

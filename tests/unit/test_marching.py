@@ -224,12 +224,12 @@ def test_multigrid_steps_agree_with_factorised_ones(monkeypatch):
     build = step_matrix_module.build_preconditioner
     built = []
 
-    def coarse(matrix):
+    def counted(matrix, exact_level):
         built.append(matrix.shape)
-        return build(matrix, exact_level=600)
+        return build(matrix, exact_level)
 
-    monkeypatch.setattr(step_matrix_module, "build_preconditioner", coarse)
-    multigrid = list(march(system, np.zeros(n), [0.0, 50.0, 100.0], scheme="bdf2", steps=5))
+    monkeypatch.setattr(step_matrix_module, "build_preconditioner", counted)
+    multigrid = list(march(system, np.zeros(n), [0.0, 50.0, 100.0], scheme="bdf2", steps=5, exact_level=600))
     assert built == [(1, 1), (n, n)]  # one hierarchy for all steps, the starter's other rate included
     assert multigrid[-1].iterations > factorised[-1].iterations
     assert multigrid[-1].temperatures == pytest.approx(factorised[-1].temperatures, abs=1e-8)

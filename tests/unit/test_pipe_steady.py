@@ -12,7 +12,8 @@ from etc_engine.errors import ConvergenceError, GeometryError, InputError
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
 from etc_engine.pipe.conductances import pipe_conductances
 from etc_engine.pipe.field import pipe_field
-from etc_engine.pipe.steady import check_balance, pipe_conductivity, solve_pipe
+from etc_engine.pipe.steady import pipe_conductivity, solve_pipe
+from etc_engine.tensor import check_balance
 
 
 @pytest.fixture(scope="module")

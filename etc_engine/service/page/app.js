@@ -1,7 +1,7 @@
 "use strict";
 // The page of the service: it only asks what any client can ask, and writes text, never markup, into the document.
 
-const BUSY_SECONDS = 1.5, IDLE_SECONDS = 4, HIDDEN_SECONDS = 20;
+const BUSY_SECONDS = 2, IDLE_SECONDS = 4, HIDDEN_SECONDS = 20, QUEUE_TURNS = 2;
 const $ = id => document.getElementById(id);
 let about = null, catalogue = null, view = { poll: null }, token = sessionStorage.getItem("etc-token") || "";
 let draft = null; // what was typed into the form of a new study, kept while other parts are looked at
@@ -108,6 +108,10 @@ const FIELDS = [
     ["conduction.method", "Method", "method", "chord", ""],
     ["conduction.conductivity", "Conductivity", "number", "1.0", "of the particles [W/(m K)]"],
     ["conduction.contact_resistance", "Contact resistance", "number", "0.0", "[m K/W]"],
+    ["composite.matrix_conductivity", "Matrix", "number", "1.0", "its conductivity [W/(m K)]"],
+    ["composite.contrast", "Contrasts", "numbers", "10", "particle over matrix"],
+    ["composite.resolution", "Resolution", "number", "64", "voxels along the shortest edge"],
+    ["composite.nodes", "Nodes", "number", "10000", "particles of the lattice"],
   ]],
   ["Statistics", [
     ["statistics.realizations", "Realizations", "number", "20", "of every density"],
@@ -120,8 +124,16 @@ const FIELDS = [
     ["models.pore_conductivity", "Pore conductivity", "number", "0.0", "[W/(m K)]"],
   ]],
 ];
-const RULE_FIELDS = { "contacts.contact_angle": ["bonded", "coordination"], "contacts.bond_gap": ["bonded", "coordination"],
-  "contacts.coordination": ["coordination"] };
+// Which fields have a meaning with the chosen engine and rule; the others are neither shown nor sent.
+function meant(path, values) {
+  const engine = values["conduction.engine"], rule = values["contacts.rule"], composite = about.composite_engines.includes(engine);
+  if (path.startsWith("composite."))
+    return composite && path !== (engine === "lattice" ? "composite.resolution" : "composite.nodes");
+  if (composite && (path.startsWith("contacts.") || path === "conduction.contact_resistance" || path === "conduction.conductivity"
+    || path === "models.pore_conductivity")) return false;
+  if (path === "contacts.coordination") return rule === "coordination";
+  return rule !== "overlap" || !["contacts.contact_angle", "contacts.bond_gap"].includes(path);
+}
 
 const number = word => word.trim() !== "" && Number.isFinite(Number(word)) ? Number(word) : word.trim();
 function valueOf(kind, word) {
@@ -154,8 +166,7 @@ function studyOf(values) {
   const study = { schema: 1 };
   for (const [, fields] of FIELDS) for (const [path, , kind] of fields) {
     const word = values[path], [table, key] = path.split(".");
-    const rules = RULE_FIELDS[path];
-    if (word.trim() === "" || (rules && !rules.includes(values["contacts.rule"]))) continue;
+    if (word.trim() === "" || !meant(path, values)) continue;
     const value = valueOf(kind, word);
     if (key) (study[table] = study[table] || {})[key] = value; else study[table] = value;
   }
@@ -221,8 +232,8 @@ function newStudy() {
   if (draft.mode === "form") {
     body.append(...FIELDS.map(([title, fields]) => h("fieldset", {}, h("legend", {}, title), h("div", { class: "fields" }, fields.map(fieldOf)))),
       h("datalist", { id: "radii-words" }, about.size_distributions.map(word => h("option", { value: word }))));
-    const hide = () => { for (const [path, rules] of Object.entries(RULE_FIELDS))
-      body.querySelector(`[data-field="${path}"]`).hidden = !rules.includes(draft.values["contacts.rule"]); };
+    const hide = () => { for (const field of body.querySelectorAll(".field")) field.hidden = !meant(field.dataset.field, draft.values);
+      for (const set of body.querySelectorAll("fieldset")) set.hidden = !set.querySelector(".field:not([hidden])"); };
     body.addEventListener("input", event => {
       draft.values[event.target.name] = event.target.value;
       if (event.target.name === "conduction.engine") { draft.values["conduction.method"] = about.conduction_methods[event.target.value][0]; newStudy(); }
@@ -266,7 +277,7 @@ function study(id) {
   const buttons = h("div", { class: "buttons" }), plot = h("figure"), table = h("div", { class: "wide" });
   const models = h("div"), log = h("pre", { tabindex: "0", "aria-label": "end of the log" });
   const shown = new Set();
-  let known = "", drawn = "", chosen = false;
+  let known = "", drawn = "", chosen = false, lagging = false, units = -1;
 
   const act = (label, action, style) => h("button", { class: style || null, onclick: async () => {
     try { await action(); alarm(""); await poll(); } catch (error) { alarm(error.message); }
@@ -341,8 +352,11 @@ function study(id) {
     log.textContent = found.log || "nothing yet";
     fillButtons(found);
     const version = `${found.state} ${found.done}`;
-    if (version !== drawn || found.state === "running") {
-      drawFigure(await get(`/api/studies/${id}/curve`));
+    if (version !== drawn || lagging) { // asked for again only when there is something new
+      const curve = await get(`/api/studies/${id}/curve`);
+      if (curve.units !== units || version !== drawn) drawFigure(curve);
+      units = curve.units;
+      lagging = found.state === "running" && units < found.done;
       drawn = version;
     }
     return found.state === "running" || found.state === "queued";
@@ -444,13 +458,13 @@ async function route() {
   } catch (error) { alarm(error.message); }
 }
 
-let ticking = null;
+let ticking = null, turn = 0, busyQueue = false;
 async function tick() {
   clearTimeout(ticking);
   let busy = false;
   try {
-    busy = await refreshQueue();
-    if (view.poll) busy = await view.poll() || busy;
+    if (turn++ % QUEUE_TURNS === 0 || !view.poll) busyQueue = await refreshQueue();
+    busy = view.poll && await view.poll() || busyQueue;
     alarm("");
   } catch (error) { if (error.status !== 401) alarm(error.message); }
   const seconds = document.hidden ? HIDDEN_SECONDS : busy ? BUSY_SECONDS : IDLE_SECONDS;

@@ -44,6 +44,7 @@ function mark(shape, x, y, colour) {
 function seriesName(series) {
   const words = [];
   if (series.contact_angle !== null) words.push(`contact half-angle ${series.contact_angle}°`);
+  if (series.contrast !== null) words.push(`contrast ${series.contrast}`);
   if (series.method !== null) words.push(series.method);
   return words.join(", ") || "simulation";
 }

@@ -1,0 +1,98 @@
+"""The commands `submit`, `status` and `fetch`, and the client behind them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from serving import STUDY, Service, renamed, until
+
+from etc_engine.batch.dataset import open_dataset
+from etc_engine.service import client
+
+TOKEN = "a-token-of-some-length"
+
+
+def test_submit_status_fetch(service, tmp_path, etc_engine):
+    server = ["--server", service.url]
+    (tmp_path / "study.toml").write_text(renamed("by command"))
+    done = etc_engine("submit", tmp_path / "study.toml", *server, "-o", tmp_path / "out.nc", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["state"], found["done"], found["name"]) == ("done", 6, "by command")
+    assert found["id"] in done.stderr
+    assert open_dataset(tmp_path / "out.nc").sizes["realization"] == 3
+    listed = etc_engine("status", *server)
+    assert f"{found['id']}  done       6/6  by command" in listed.stdout.splitlines()
+    one = etc_engine("status", found["id"], *server)
+    assert "6 units (6 computed now" in one.stdout
+    assert json.loads(etc_engine("status", found["id"], *server, "--json").stdout)["state"] == "done"
+    fetched = etc_engine("fetch", found["id"], *server, "-o", tmp_path / "again.nc")
+    assert fetched.returncode == 0
+    assert (tmp_path / "again.nc").read_bytes() == (tmp_path / "out.nc").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again.nc", "out.nc", "study.toml"]
+
+
+def test_cancel_and_resume(tmp_path, etc_engine):
+    with Service(tmp_path / "data", {"token": TOKEN}, {"ETC_TEST_SECONDS": "0.5"}, slow=True) as service:
+        (tmp_path / "token").write_text(TOKEN + "\n")
+        (tmp_path / "study.toml").write_text(STUDY)
+        server = ["--server", service.url, "--token-file", tmp_path / "token"]
+        study = json.loads(etc_engine("submit", tmp_path / "study.toml", *server, "--json").stdout)["id"]
+        until(lambda: client.status(service.server, study)["done"] >= 1)
+        assert etc_engine("status", study, *server, "--cancel").returncode == 0
+        ended = client.wait(service.server, study, interval=0.05)
+        assert ended["state"] == "cancelled"
+        assert etc_engine("fetch", study, *server, "-o", tmp_path / "out.nc").returncode == 2
+        waited = etc_engine("submit", tmp_path / "study.toml", *server, "--wait")
+        assert waited.returncode == 0
+        assert "6/6  served" in waited.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["submit", "missing.toml"], "cannot be read"),
+        (["submit", "bad.toml"], "packing: missing"),
+        (["submit", "large.toml"], "this service allows 100000"),
+        (["submit", "good.toml", "-o", "none/out.nc"], "cannot write none/out.nc"),
+        (["status", "0123456789abcdef"], "there is no study 0123456789abcdef"),
+        (["status", "../x"], "there is nothing at /api/studies/../x"),
+        (["status", "--cancel"], "need the identity"),
+        (["fetch", "0123456789abcdef", "-o", "out.nc"], "there is no study"),
+        (["fetch", "0123456789abcdef"], "Missing option '-o'"),
+    ],
+)
+def test_refusals_are_one_line(service, tmp_path, monkeypatch, etc_engine, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text('schema = 1\nname = "x"\nseed = 7\n[statistics]\nrealizations = 2\n')
+    (tmp_path / "good.toml").write_text(STUDY)
+    (tmp_path / "large.toml").write_text(STUDY.replace("realizations = 3", "realizations = 100000"))
+    before = sorted(path.name for path in tmp_path.iterdir())
+    done = etc_engine(*arguments, "--server", service.url)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert len(done.stderr.splitlines()) == 1
+    assert words in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("http://127.0.0.1:9", "does not answer"),
+        ("here", "expected an address"),
+        ("http://a:b@c", "expected an address"),
+    ],
+)
+def test_wrong_addresses(etc_engine, address, words):
+    done = etc_engine("status", "--server", address)
+    assert done.returncode == 2
+    assert words in done.stderr
+
+
+def test_the_client_answers_datasets(service):
+    study = client.submit(service.server, renamed("dataset"))
+    assert client.wait(service.server, study["id"], interval=0.05)["state"] == "done"
+    dataset = client.fetch(service.server, study["id"])
+    assert dict(dataset.sizes)["density"] == 2
+    assert dataset.conductivity_mean.notnull().any()
