@@ -9,10 +9,12 @@ from etc_engine.box import Box
 from etc_engine.contacts import bonded_contacts
 from etc_engine.dtem.sides import contact_sides
 from etc_engine.dtem.transient import contact_flows, particle_sides, transient_system
-from etc_engine.meshless import ContactArc, heat_disk_by_flows, heat_disk_through_arcs
+from etc_engine.errors import InputError
+from etc_engine.meshless import ContactArc, flow_histories, heat_disk_by_flows, heat_disk_through_arcs
 from etc_engine.packing import ParticlePacking
 from etc_engine.pipe.conductances import pipe_conductances
 from etc_engine.pipe.flows import pipe_contact_flows
+from etc_engine.pipe.steady import pipe_conductivity
 from etc_engine.pipe.transient import pipe_transient
 from etc_engine.solvers.marching import march
 from etc_engine.walls import FixedTemperature
@@ -72,3 +74,39 @@ def test_pipe_flows_feed_the_particles(row):
     np.testing.assert_allclose(into, pipes.heat.slope(state.time, state.temperatures)[:2], atol=1e-13)
     between, _ = pipe_conductances(row, **given)
     assert flows[sides.of_contacts[0, 1]] == pytest.approx(between[0] * (means[0] - means[1]))
+
+
+def test_pipe_flows_at_rest_are_those_of_the_steady_network(row):
+    system = pipe_transient(row, WALLS | {"right": FixedTemperature(0.0)})
+    *_, late = march(system.heat, system.initial(0.5), [0.0, 400.0], steps=100)
+    sides = contact_sides(row)
+    walls = system.wall_temperatures(late.time, late.temperatures)
+    flows = pipe_contact_flows(row, sides, system.particle_temperatures(late.temperatures), walls)
+    steady = pipe_conductivity(row, axes=(0,)).solutions[0]
+    np.testing.assert_allclose(np.abs(flows[np.abs(flows) > 1e-9]), abs(steady.contact_flows[0, 0]), rtol=1e-8)
+    np.testing.assert_allclose(np.bincount(sides.particles, flows), 0.0, atol=1e-12)
+
+
+def test_no_such_particle(row):
+    with pytest.raises(InputError, match="no particle 2: they are numbered from 0 to 1"):
+        particle_sides(transient_system(row, WALLS), 2)
+
+
+@pytest.mark.parametrize(
+    ("times", "flows", "outputs", "words"),
+    [
+        ([0.0], [[1.0]], [0.0], "at least two increasing times"),
+        ([0.0, 0.0], [[1.0], [1.0]], [0.0], "at least two increasing times"),
+        ([0.0, 1.0], [[1.0], [np.nan]], [0.5], "finite values"),
+        ([0.0, 1.0], [[1.0], [1.0]], [2.0], "within the march from 0 to 1 s"),
+        ([0.5, 1.0], [[1.0], [1.0]], [0.7], "within the march"),
+    ],
+)
+def test_flows_that_are_not_understood(times, flows, outputs, words):
+    with pytest.raises(InputError, match=words):
+        heat_disk_by_flows([ContactArc(0.0, 0.3)], times, flows, outputs)
+
+
+def test_histories_are_linear_between_the_times_and_constant_outside():
+    (history,) = flow_histories([1.0, 3.0], [[2.0], [4.0]])
+    assert [history(t) for t in (0.0, 2.0, 9.0)] == [2.0, 3.0, 4.0]
