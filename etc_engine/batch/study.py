@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from etc_engine.batch.study_tables import (
@@ -30,12 +30,22 @@ from etc_engine.errors import StudyError
 from etc_engine.packing import PackingSpec
 from etc_engine.realization import ENGINES, CompositeSpec, ConductionSpec, ContactSpec, Mixture, RealizationSpec
 
+LONGEST_NAME = 80
+
+
+def _printable(name: str) -> str:
+    """Names stand in tables and on terminals."""
+    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
+        shown = name if len(name) <= LONGEST_NAME else f"{name[:20]}... ({len(name)} characters)"
+        raise ValueError(f"found {shown!r}, allowed: 1 to {LONGEST_NAME} printable characters")
+    return name
+
 
 class Study(StudyTable):
     """A sweep: densities x contact angles (or contrasts) x methods x realizations of one kind of packing."""
 
     schema_: Literal[1] = Field(alias="schema", description="1")
-    name: Word = Field(description="a name")
+    name: Annotated[Word, AfterValidator(_printable)] = Field(description="a name of 1 to 80 printable characters")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = Field(description="a whole number from 0 to 2**63 - 1")
     packing: PackingTable = Field(description="a table")
     contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
@@ -193,7 +203,7 @@ def parse_study(text: str, source: str = "study") -> Study:
     """
     try:
         values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # beside its own errors: numbers of 5000 digits, lists 3000 deep
         raise StudyError(f"{source}: is not valid TOML: {error}") from None
     try:
         return Study.model_validate(values)
