@@ -78,6 +78,11 @@ def test_without_density_the_packer_decides():
             ("conduction.angle_curve", "found 'some'", "reduced or full"),
         ),
         ("[statistics]", "[conduction]\nmethod = 5\n[statistics]", ("conduction.method", "found 5")),
+        (
+            "[statistics]",
+            '[conduction]\npipe_resistance = "chord"\n[statistics]',
+            ("conduction.pipe_resistance: unknown key", "engine = 'pipe' has method = 'chord' or 'uniform'"),
+        ),
         ("[statistics]", '[conduction]\nengine = "fem"\n[statistics]', ("conduction.engine", "found 'fem'", "dtem")),
         ("realizations = 3", "realizations = 0", ("statistics.realizations", "found 0", "at least 1")),
         ("realizations = 3", "realizations = 2.5", ("statistics.realizations", "found 2.5")),
