@@ -20,6 +20,9 @@ BOUNDARIES = ("periodic", "walls")
 NOTHING = 1e-14
 """A conductivity below this part of the largest counts as 0."""
 
+CUT_OFF = 1e-9
+"""An effective conductivity below this part of the largest of the phases is 0."""
+
 SINGULAR = 1e-11
 """Part of the largest resistivity below which perfect conductors are said to join across the cell."""
 
