@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from etc_engine.dtem.field import ParticleField, recover_field
     from etc_engine.dtem.interior import temperatures_inside
     from etc_engine.dtem.steady import solve_steady
+    from etc_engine.dtem.transient import transient_system
     from etc_engine.effective import effective_conductivity, mean_field_conductivity
     from etc_engine.errors import EtcError
     from etc_engine.lattice.homogenize import homogenize_lattice
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
     from etc_engine.packing.files import read_csv
     from etc_engine.percolation import find_backbone
     from etc_engine.pipe.steady import pipe_conductivity
+    from etc_engine.pipe.transient import pipe_transient
     from etc_engine.realization import RealizationSpec, realize
+    from etc_engine.solvers.marching import march
     from etc_engine.tensor import EffectiveConductivity
     from etc_engine.voxel.homogenize import homogenize_voxel
 
@@ -54,11 +57,13 @@ _HOMES = {
     "find_backbone": "percolation",
     "homogenize_lattice": "lattice.homogenize",
     "homogenize_voxel": "voxel.homogenize",
+    "march": "solvers.marching",
     "mean_field_conductivity": "effective",
     "overlap_contacts": "contacts",
     "pack": "packing",
     "parse_radii": "packing",
     "pipe_conductivity": "pipe.steady",
+    "pipe_transient": "pipe.transient",
     "read_csv": "packing.files",
     "read_dump": "packing.dumps",
     "realize": "realization",
@@ -66,6 +71,7 @@ _HOMES = {
     "solid_fraction": "packing",
     "solve_steady": "dtem.steady",
     "temperatures_inside": "dtem.interior",
+    "transient_system": "dtem.transient",
 }
 
 __all__ = [
@@ -85,11 +91,13 @@ __all__ = [
     "find_backbone",
     "homogenize_lattice",
     "homogenize_voxel",
+    "march",
     "mean_field_conductivity",
     "overlap_contacts",
     "pack",
     "parse_radii",
     "pipe_conductivity",
+    "pipe_transient",
     "read_csv",
     "read_dump",
     "realize",
@@ -97,6 +105,7 @@ __all__ = [
     "solid_fraction",
     "solve_steady",
     "temperatures_inside",
+    "transient_system",
 ]
 
 

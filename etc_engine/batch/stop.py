@@ -29,14 +29,25 @@ class StopRequest:
         self._before: dict[int, Any] = {}
 
     def run(self, unit: Callable[[], T]) -> T:
-        """Run a unit; `Stopped` leaves it when a signal comes or has come."""
+        """Run a unit; `Stopped` leaves it when a signal comes or has come.
+
+        Compiled code turns `Stopped` into an error of its own, which a unit may record: what a unit answers after a
+        signal is no result.
+        """
         try:
             self._in_unit = True
             if self.reason:
                 raise Stopped
-            return unit()
+            result = unit()
+        except Exception:
+            if self.reason:
+                raise Stopped from None
+            raise
         finally:
             self._in_unit = False
+        if self.reason:
+            raise Stopped
+        return result
 
     def _note(self, number: int, _frame: FrameType | None) -> None:
         first, self.reason = not self.reason, self.reason or signal.Signals(number).name

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from etc_engine.batch.study_tables import (
     CompositeTable,
@@ -29,12 +29,22 @@ from etc_engine.schema import StudyTable, Word, first_problem
 HINTS = {"conduction.pipe_resistance": "engine = 'pipe' has method = 'chord' or 'uniform', the resistance of its pipes"}
 """What to say of keys that other commands have."""
 
+LONGEST_NAME = 80
+
+
+def _printable(name: str) -> str:
+    """Names stand in tables and on terminals."""
+    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
+        shown = name if len(name) <= LONGEST_NAME else f"{name[:20]}... ({len(name)} characters)"
+        raise ValueError(f"found {shown!r}, allowed: 1 to {LONGEST_NAME} printable characters")
+    return name
+
 
 class Study(StudyTable):
     """A sweep: densities x contact angles (or contrasts) x methods x realizations of one kind of packing."""
 
     schema_: Literal[1] = Field(alias="schema", description="1")
-    name: Word = Field(description="a name")
+    name: Annotated[Word, AfterValidator(_printable)] = Field(description="a name of 1 to 80 printable characters")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = Field(description="a whole number from 0 to 2**63 - 1")
     packing: PackingTable = Field(description="a table")
     contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
@@ -100,8 +110,18 @@ class Study(StudyTable):
         return Box(lengths, parse_periodic(self.packing.periodic, len(lengths)))
 
     def resolved(self) -> dict[str, Any]:
-        """The study with all defaults written out, as plain JSON values."""
-        return self.model_dump(mode="json", by_alias=True)
+        """The study with all defaults written out, as plain JSON values, less what has no meaning in it.
+
+        It is a study again, the same one.
+        """
+        values = self.model_dump(mode="json", by_alias=True)
+        if self.composite is not None:
+            del values["contacts"]
+            del values["models"]["pore_conductivity"]
+            del values["composite"]["nodes" if self.conduction.engine == "voxel" else "resolution"]
+            if self.composite.contrast is not None:
+                del values["conduction"]["conductivity"]
+        return values
 
     def identity(self) -> dict[str, Any]:
         """What decides the numbers of the result: everything but the name and the models."""
@@ -182,7 +202,7 @@ def parse_study(text: str, source: str = "study") -> Study:
     """
     try:
         values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # beside its own errors: numbers of 5000 digits, lists 3000 deep
         raise StudyError(f"{source}: is not valid TOML: {error}") from None
     try:
         return Study.model_validate(values)

@@ -40,7 +40,8 @@ def _known_engine(word: str) -> str:
     return word
 
 
-Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
+# squares and products of what a study says must stay finite
+Positive = Annotated[float, Field(strict=True, ge=1e-100, le=1e100)]
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(strict=True, gt=0.0, lt=1.0)]

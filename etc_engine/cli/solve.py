@@ -325,4 +325,5 @@ def _print_table(record: dict[str, Any]) -> None:
         else:
             text = f"{value:.8g}" if isinstance(value, float) else str(value)
         unit = " W/(m K)" if name.startswith("conductivity") else ""
-        click.echo(f"{name.replace('_', ' '):24s}{text}{unit}")
+        label = "wall contacts along x" if name == "wall_contacts" else name.replace("_", " ")
+        click.echo(f"{label:24s}{text}{unit}")

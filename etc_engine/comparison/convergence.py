@@ -106,5 +106,5 @@ def _comparable(dataset: xarray.Dataset) -> dict[str, object]:
     packing = {key: value for key, value in study["packing"].items() if key not in ("box", "count", "radii")}
     return {
         **{f"packing.{key}": value for key, value in packing.items()},
-        **{k: study[k] for k in ("contacts", "conduction")},
+        **{k: study.get(k) for k in ("contacts", "conduction", "composite")},
     }

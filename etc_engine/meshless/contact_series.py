@@ -59,7 +59,8 @@ def heat_disk_by_flows(
     flows: ArrayLike,
     output_times: Sequence[float] | Array,
     *,
-    steps: int = 60,
+    steps: int = 200,
+    decades: int = 3,
     **disk: float,
 ) -> xarray.Dataset:
     """Temperature inside one particle of a network, under the heat flows that a transient of the network found.
@@ -75,8 +76,11 @@ def heat_disk_by_flows(
     output_times : sequence of float [s]
         Increasing, within the march.
     steps : int
-        Time steps up to the last output time of each decade: early times, where the flows change fast, are marched
-        again from the start in short steps. Many more than 60 ask for finer boundary nodes than the default ones.
+        Time steps up to the last output time of each decade: earlier times, where the flows change faster, are
+        marched again from the start in shorter steps.
+    decades : int
+        How many of the last decades are marched on their own; what is earlier goes with the first of them. Shorter
+        steps than the boundary nodes can follow end in a `DiscretizationWarning`.
     **disk
         ``radius``, ``conductivity``, ``heat_capacity`` and ``initial`` of `heat_disk_through_arcs`.
 
@@ -92,10 +96,6 @@ def heat_disk_by_flows(
         If the flows are not understood, or output times lie outside the march.
     GeometryError
         If arcs overlap.
-
-    Notes
-    -----
-    Only the output times of a decade are solved with its steps, so that the cost grows with the number of decades.
 
     Examples
     --------
@@ -114,8 +114,8 @@ def heat_disk_by_flows(
             f"the output times must lie within the march from 0 to {given[-1]:g} s, found "
             f"{wanted[:1].tolist()} to {wanted[-1:].tolist()}"
         )
-    decades = np.floor(np.log10(wanted[-1] / np.maximum(wanted, 1e-12 * wanted[-1])) + 1e-9)
-    ends = [0, *(np.flatnonzero(np.diff(decades)) + 1), wanted.size]
+    before = np.floor(np.log10(wanted[-1] / np.maximum(wanted, 1e-12 * wanted[-1])) + 1e-9)
+    ends = [0, *(np.flatnonzero(np.diff(np.minimum(before, decades - 1))) + 1), wanted.size]
     parts = [
         heat_disk_through_arcs(arcs, histories, wanted[low:high], steps=steps, **disk)  # type: ignore[arg-type]
         for low, high in pairwise(ends)

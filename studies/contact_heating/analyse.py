@@ -1,7 +1,8 @@
 """The true temperature inside two disks of a bed that warms up, against what the network models take it for.
 
 ``python studies/contact_heating/analyse.py [--output DIRECTORY]`` writes contact_heating.csv and contact_heating.png.
-The heat that each model sends through the contacts of a disk is given to a meshless solution of its inside.
+The heat that each model sends through the contacts of a disk is given to a meshless solution of the inside of that
+disk.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ def marched(network: ContactNetwork, model: str, unit: float) -> tuple[np.ndarra
     return times, np.array(flows), np.array(contacts), np.array(means)
 
 
-def inside(network: ContactNetwork, model: str, particle: int, steps: int = 60) -> Inside:
+def inside(network: ContactNetwork, model: str, particle: int, steps: int = 200) -> Inside:
     """March the network, then the inside of one particle under its fluxes."""
     radius = float(network.packing.radii[particle])
     unit = radius**2
@@ -153,12 +154,12 @@ def draw(path: Path, results: dict[tuple[str, str], Inside]) -> None:
         row[1].loglog(FOURIER, away, color=INK, linewidth=1.6, label="farthest contact from the true mean")
         row[1].set_title("largest error of a contact, and (dotted) of the mean", fontsize=10, loc="left")
         row[1].set_ylabel("error, wall stepped by 1 K [K]", fontsize=9)
-        row[1].set_ylim(1e-5, 2.0)
+        row[1].set_ylim(2e-6, 2.0)
         for axes in row:
             style(axes)
             axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$", fontsize=9)
         row[0].legend(fontsize=7.5, frameon=False)
-    grid[0, 1].legend(fontsize=7.5, frameon=False)
+    grid[0, 1].legend(fontsize=7.5, frameon=False, loc="lower left")
     save(figure, path)
 
 

@@ -52,7 +52,7 @@ def errors(case: Case, model: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     fourier, flows, means = reference(case)
     found, temperatures = run(case, model, fourier)
     left = np.abs(found[:, 0] / flows[:, 0] - 1.0)
-    left[np.abs(flows[:, 0]) < 1e-4] = np.nan  # in the end no heat flows into the two disks
+    left[np.abs(flows[:, 0]) < 0.01] = np.nan  # in the end no heat flows into the two disks
     return fourier, np.abs(temperatures - means).max(axis=1), left
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from etc_engine.batch.dataset import open_dataset
-from etc_engine.batch.study import parse_study
+from etc_engine.batch.study import Study, parse_study
 from etc_engine.box import Box
 from etc_engine.comparison import evaluate_models
 from etc_engine.errors import StudyError
@@ -172,3 +172,36 @@ def test_the_lattice_engine_shares_one_lattice_among_the_contrasts():
     alone = replace(spec, composite=replace(spec.composite, contrasts=(5.0,)))
     again = realize(alone, np.random.default_rng(74)).cells[0][0]
     np.testing.assert_array_equal(again.conductivity, filled[0].conductivity)
+
+
+LATTICE = (
+    STUDY.replace('engine = "voxel"', 'engine = "lattice"')
+    .replace("resolution = 32", "nodes = 400")
+    .replace("[1.0, 1.0]", "[1.0, 1.0, 1.0]")
+    .replace('"xy"', '"xyz"')
+    .replace("[0.2, 0.4]", "[0.2]")
+    .replace("count = 12", "count = 4")
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        STUDY,
+        STUDY.replace("contrast = [10.0, 2.0]", "contrast = 3.0"),
+        STUDY.replace("contrast = [10.0, 2.0]\n", "").replace("tolerance = 1e-8", "conductivity = 3.0"),
+        LATTICE,
+    ],
+    ids=["contrasts", "one contrast", "own conductivity", "lattice"],
+)
+def test_a_result_tells_how_to_make_it_again(etc_engine, tmp_path, text):
+    study = parse_study(text)
+    again = Study.model_validate(study.resolved())
+    assert again.resolved() == study.resolved()
+    assert again.digest() == study.digest()
+    (tmp_path / "study.toml").write_text(text.replace("realizations = 3", "realizations = 1"))
+    out = tmp_path / "out.nc"
+    assert etc_engine("sweep", tmp_path / "study.toml", "-o", out).returncode == 0
+    done = etc_engine("rerun", out, "--density", "0.2", "--realization", "0")
+    assert done.returncode == 0, done.stderr
+    assert etc_engine("info", out).returncode == 0
