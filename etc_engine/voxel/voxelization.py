@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,9 @@ FADING = 100.0
 
 FEWEST = 4
 """Voxels across the smallest inclusion, at least."""
+
+FIELDS = 7
+"""Vector fields that the solver holds at once."""
 
 GRAIN = 1e-9
 """Part of a voxel below which a plane or a sphere does not cut it."""
@@ -83,12 +87,13 @@ def smallest_diameter(composite: Composite, resolution: int) -> float:
 
 
 def check_resolution(composite: Composite, resolution: int) -> None:
-    """Refuse a grid with fewer than `FEWEST` voxels across the smallest inclusion.
+    """Refuse a grid with fewer than `FEWEST` voxels across the smallest inclusion, or that does not fit into memory.
 
     Raises
     ------
     InputError
     """
+    check_memory(composite.inclusions.box.lengths, resolution)
     spanned = smallest_diameter(composite, resolution)
     if spanned < FEWEST * (1.0 - 1e-12):
         diameter = 2.0 * float(composite.inclusions.radii.min())
@@ -96,6 +101,26 @@ def check_resolution(composite: Composite, resolution: int) -> None:
         raise InputError(
             f"resolution {resolution} is too coarse: the smallest inclusion, of diameter {diameter:.6g}, spans "
             f"{spanned:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
+        )
+
+
+def check_memory(lengths: tuple[float, ...], resolution: int) -> None:
+    """Refuse a resolution that is no whole number of at least 1, or whose grid this machine has no memory for.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(resolution, (int, np.integer)) or resolution < 1:
+        raise InputError(f"the resolution is a whole number of at least 1, found {resolution!r}")
+    shape = grid_shape(lengths, int(resolution))
+    needed = FIELDS * len(shape) * 8.0 * float(np.prod([float(count) for count in shape]))
+    there = float(os.sysconf("SC_PAGE_SIZE")) * float(os.sysconf("SC_PHYS_PAGES"))
+    if needed > there:
+        grid = " x ".join(str(count) for count in shape)
+        raise InputError(
+            f"resolution {resolution} makes a grid of {grid} voxels, which needs about {needed / 1e9:.3g} GB of memory "
+            f"where this machine has {there / 1e9:.3g}: take a coarser one"
         )
 
 
@@ -134,8 +159,8 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     resistivity) instead: no heat crosses the interface, so that nothing is gained by a laminate that insulates
     whole voxels along the normal; the error is a tenth. The same holds long before: from a contrast c of 100 to the
     matrix (or 1/100) on, the logarithms of a voxel's conductivities pass by the part 1 - 100/c from the laminate to the
-    isotropic mean resistivity (mean conductivity). That supposes that the better conductor (the worse one, of disks) does not reach
-    through the cell: where inclusions overlap all the way across, or across the walls, laminates remain.
+    isotropic mean resistivity (mean conductivity). That supposes that the better conductor (the worse one,
+    of disks) does not reach through the cell: where inclusions overlap all the way across, or across the walls, laminates remain.
 
     References
     ----------
