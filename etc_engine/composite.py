@@ -149,8 +149,9 @@ def _refuse_span(conductivities: NDArray[np.float64]) -> None:
     least, largest = float(finite.min(initial=np.inf)), float(finite.max(initial=0.0))
     if least < 1.0 / EXTREME or largest > EXTREME or largest / least > SPAN:
         raise InputError(
-            f"the conductivities reach from {least:g} to {largest:g} W/(m K): allowed are numbers from {1.0 / EXTREME:g} "
-            f"to {EXTREME:g} within a factor of {SPAN:g}; give 0 or inf for what hardly or perfectly conducts"
+            f"the conductivities reach from {least:g} to {largest:g} W/(m K): allowed are numbers from "
+            f"{1.0 / EXTREME:g} to {EXTREME:g} within a factor of {SPAN:g}; give 0 or inf for what hardly or "
+            "perfectly conducts"
         )
 
 

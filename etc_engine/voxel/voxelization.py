@@ -86,6 +86,17 @@ def smallest_diameter(composite: Composite, resolution: int) -> float:
     return 2.0 * float(composite.inclusions.radii.min()) / step
 
 
+def coarsest_resolution(lengths: tuple[float, ...], radius: float) -> int:
+    """Least resolution that has `FEWEST` voxels across an inclusion of the radius, in cubic voxels.
+
+    Examples
+    --------
+    >>> coarsest_resolution((1.0, 2.0), 0.05)
+    40
+    """
+    return int(np.ceil(FEWEST * min(lengths) / (2.0 * radius) * (1.0 - 1e-12)))
+
+
 def check_resolution(composite: Composite, resolution: int) -> None:
     """Refuse a grid with fewer than `FEWEST` voxels across the smallest inclusion, or that does not fit into memory.
 
@@ -97,7 +108,7 @@ def check_resolution(composite: Composite, resolution: int) -> None:
     spanned = smallest_diameter(composite, resolution)
     if spanned < FEWEST * (1.0 - 1e-12):
         diameter = 2.0 * float(composite.inclusions.radii.min())
-        needed = int(np.ceil(FEWEST * min(composite.inclusions.box.lengths) / diameter))
+        needed = coarsest_resolution(composite.inclusions.box.lengths, 0.5 * diameter)
         raise InputError(
             f"resolution {resolution} is too coarse: the smallest inclusion, of diameter {diameter:.6g}, spans "
             f"{spanned:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
@@ -160,7 +171,7 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     whole voxels along the normal; the error is a tenth. The same holds long before: from a contrast c of 100 to the
     matrix (or 1/100) on, the logarithms of a voxel's conductivities pass by the part 1 - 100/c from the laminate to the
     isotropic mean resistivity (mean conductivity). That supposes that the better conductor (the worse one,
-    of disks) does not reach through the cell: where inclusions overlap all the way across, or across the walls, laminates remain.
+    of disks) does not reach through the cell: where inclusions overlap all the way across, laminates remain.
 
     References
     ----------
@@ -251,7 +262,7 @@ def _laminates(
     np.maximum.at(largest, of, k)
     principal = np.repeat(parallel[:, None], d, axis=1).astype(np.float64)
     principal[:, 0] = np.where(least > 0.0, np.minimum(series, parallel), parallel)
-    _fade(principal, composite, least, largest, series, parallel)
+    _fade(principal, composite, least, largest, series, parallel.astype(np.float64))
     principal[np.isinf(largest)] = series[np.isinf(largest), None]
     return rows, principal, axes
 

@@ -63,6 +63,18 @@ SPEC = RealizationSpec(
         ("tolerance", "conductivity = 1.0\ntolerance", "composite.contrast gives that of the particles"),
         ("[statistics]", '[contacts]\nrule = "bonded"\ncontact_angle = 5.0\n[statistics]', "contacts: has no meaning"),
         ("[statistics]", "[models]\npore_conductivity = 0.1\n[statistics]", "composite.matrix_conductivity says it"),
+        ("resolution = 32", "resolution = 32\nnodes = 900", "composite.nodes: has no meaning with engine = 'voxel'"),
+        ("resolution = 32", "resolution = 100000", "composite.resolution: .* GB of memory"),
+        (
+            "resolution = 32",
+            "resolution = 24",
+            "found 24, too coarse for the smallest particle, of diameter 0.145673: allowed is at least 28",
+        ),
+        (
+            'radii = "equal"\ncount = 12',
+            'radii = "bidisperse:0.02:0.1:0.5"',
+            "too coarse for the smallest particle, of diameter 0.04: allowed is at least 100",
+        ),
         ('engine = "voxel"', 'engine = "lattice"', "engine 'lattice' works in 3D"),
         ('engine = "voxel"', 'engine = "voxel"\nmethod = "chord"', "allowed with voxel: laminate, binary"),
     ],
@@ -71,6 +83,15 @@ def test_what_a_composite_study_may_not_say(old, new, words):
     assert old in STUDY
     with pytest.raises(StudyError, match=words):
         parse_study(STUDY.replace(old, new))
+
+
+def test_resolution_has_no_meaning_with_the_lattice():
+    space = (
+        STUDY.replace("box = [1.0, 1.0]", "box = [1.0, 1.0, 1.0]").replace('"xy"', '"xyz"').replace("voxel", "lattice")
+    )
+    with pytest.raises(StudyError, match=r"composite\.resolution: has no meaning with engine = 'lattice'"):
+        parse_study(space)
+    assert parse_study(space.replace("resolution = 32", "nodes = 900")).composite.nodes == 900
 
 
 def test_contrasts_are_the_second_axis_and_the_default_method_is_the_engines():
