@@ -217,11 +217,13 @@ def _draw_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: 
 
 
 def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
-    """Names at the right ends of the model lines, moved apart where they would overlap."""
+    """Names at the right ends of the model lines, or where they leave the panel, moved apart."""
     ends = []
+    bottom, top = axes.get_ylim()
     for name, x, y in _lines(part, lines, axis):
-        i = int(np.flatnonzero(np.isfinite(y))[-1])
-        ends.append((name, float(x[i]), float(y[i])))
+        shown = np.flatnonzero((y >= bottom) & (y <= top))
+        if shown.size:
+            ends.append((name, float(x[shown[-1]]), float(y[shown[-1]])))
     if not ends:
         return
     axes.set_xlim(axes.get_xlim())  # the labels are placed in these limits

@@ -8,8 +8,9 @@ import pytest
 from etc_engine.batch.dataset import open_dataset
 from etc_engine.batch.study import parse_study
 from etc_engine.box import Box
-from etc_engine.comparison import evaluate_models
+from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.errors import StudyError
+from etc_engine.figures import draw_comparison
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import CompositeSpec, ConductionSpec, ContactSpec, RealizationSpec, Status, realize
 from etc_engine.service.curve import curve_of
@@ -144,6 +145,11 @@ def test_a_sweep_compares_each_contrast_with_models_of_its_own(etc_engine, tmp_p
     maxwell = comparison.model_conductivity.sel(model="maxwell", density=0.2)
     beta = (np.array([2.0, 10.0]) - 1.0) / (np.array([2.0, 10.0]) + 1.0)
     np.testing.assert_allclose(maxwell, 0.5 * (1.0 + 0.2 * beta) / (1.0 - 0.2 * beta), rtol=1e-5)
+    panels = draw_comparison(comparison, model_lines(comparison)).axes
+    assert [panel.get_title() for panel in panels] == ["contrast 2", "contrast 10"]
+    for panel in panels:  # each names the lines of its own contrast, about the data
+        assert "Maxwell" in {text.get_text() for text in panel.texts}
+        assert 0.3 < panel.get_ylim()[0] < float(comparison.conductivity_mean.min())
     curve = curve_of(data)
     assert [series["contrast"] for series in curve["series"]] == [2.0, 10.0]
     lines = {model["name"]: model["curves"] for model in curve["models"]}
