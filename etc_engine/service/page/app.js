@@ -380,15 +380,21 @@ function solve() {
   const form = h("form", { novalidate: true }, h("fieldset", {}, h("legend", {}, "Particles"), h("div", { class: "fields" },
     field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS dump"),
     input("box", "1,1", "edge lengths, for CSV; a dump brings its own", "Box"), input("periodic", "", "such as xy, for CSV", "Periodic axes"),
-    field("method", "Method", h("select", { id: "method", name: "method" }, about.conduction_methods.dtem.map(m => h("option", {}, m))), ""),
+    field("method", "Method", h("select", { id: "method", name: "method" }, [...about.conduction_methods.dtem, "pipe"].map(m => h("option", {}, m))), ""),
+    field("pipe_resistance", "Pipe resistance", h("select", { id: "pipe_resistance", name: "pipe_resistance" },
+      about.conduction_methods.pipe.map(m => h("option", {}, m))), "with the method pipe"),
     input("contact_angle", "", "degrees; empty: overlaps", "Contact half-angle"), input("conductivity", "", "of the particles [W/(m K)]", "Conductivity"))),
     h("div", { class: "buttons" }, button));
+  const pipe = form.querySelector("#pipe_resistance").closest(".field"), hide = () => { pipe.hidden = form.elements.method.value !== "pipe"; };
+  form.addEventListener("change", hide);
+  hide();
   form.addEventListener("submit", async event => {
     event.preventDefault();
     const file = $("file").files[0];
     if (!file) { answer.replaceChildren(h("p", { class: "error" }, "Choose a file first.")); return; }
     const query = new URLSearchParams();
-    for (const name of ["box", "periodic", "method", "contact_angle", "conductivity"]) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
+    const names = ["box", "periodic", "method", "contact_angle", "conductivity", ...form.elements.method.value === "pipe" ? ["pipe_resistance"] : []];
+    for (const name of names) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
     button.disabled = true;
     answer.replaceChildren(h("p", { class: "faint" }, "Solving …"));
     try {
