@@ -12,6 +12,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from etc_engine.errors import EtcError, InputError, StudyError
 from etc_engine.service.admission import field_of, toml_of
@@ -65,6 +66,7 @@ def add_refusals(app: FastAPI) -> None:
     """Answer every exception of an application in JSON."""
     app.add_exception_handler(RequestValidationError, _refuse_parameter)
     app.add_exception_handler(HTTPException, _refuse_request)
+    app.add_exception_handler(ClientDisconnect, _say_nothing)
     app.add_exception_handler(EtcError, _refuse_input)
     app.add_exception_handler(OSError, _report_failure)
     app.add_exception_handler(sqlite3.Error, _report_failure)
@@ -100,6 +102,11 @@ def _refuse_input(_request: Request, error: Exception) -> Response:
     if isinstance(error, BusyError):
         return _problem(429, str(error))
     return _problem(422, str(error), field_of(str(error)) if isinstance(error, StudyError) else "")
+
+
+def _say_nothing(_request: Request, _error: Exception) -> Response:
+    """The client has gone in the middle of its upload: nobody reads the answer."""
+    return Response(status_code=400)
 
 
 def _refuse_request(request: Request, error: Exception) -> Response:

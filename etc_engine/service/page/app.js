@@ -61,6 +61,13 @@ function download(path, label) {
   } }, label);
 }
 
+// Words of others: what has no picture is shown by its number, what is too long is cut.
+const NAME_LENGTH = 60;
+function clean(text) {
+  const letters = [...text.replace(/[\p{C}\p{Zl}\p{Zp}]/gu, letter => `\\u{${letter.codePointAt(0).toString(16)}}`)];
+  return letters.length > NAME_LENGTH ? letters.slice(0, NAME_LENGTH - 1).join("") + "…" : letters.join("");
+}
+
 // ---- the queue
 
 async function refreshQueue() {
@@ -68,11 +75,11 @@ async function refreshQueue() {
   const shown = location.hash.replace("#/study/", "");
   const items = studies.map(study => h("li", {},
     h("a", { href: `#/study/${study.id}`, "aria-current": study.id === shown ? "page" : null },
-      h("span", { class: "row" }, h("span", { class: "name" }, study.name),
+      h("span", { class: "row" }, h("span", { class: "name" }, clean(study.name)),
         h("span", { class: `state ${study.state}` }, stateOf(study))),
       study.state === "running" || study.state === "queued"
-        ? h("progress", { max: study.planned, value: study.done, "aria-label": `progress of ${study.name}` }) : null,
-      h("span", { class: "row faint" }, h("span", {}, `${study.done} of ${study.planned} packings`)))));
+        ? h("progress", { max: study.planned, value: study.done, "aria-label": `progress of ${clean(study.name)}` }) : null,
+      h("span", { class: "row faint" }, h("span", {}, `${study.done} of ${study.planned} packings${failedOf(study)}`)))));
   const focused = document.activeElement && document.activeElement.closest("#queue") ? document.activeElement.hash : null;
   $("queue").replaceChildren(...items);
   if (focused) { const again = $("queue").querySelector(`a[href="${focused}"]`); if (again) again.focus(); }
@@ -80,7 +87,8 @@ async function refreshQueue() {
   $("queue-more").textContent = total > studies.length ? `and ${total - studies.length} older ones` : "";
   return studies.some(study => study.state === "running" || study.state === "queued");
 }
-const stateOf = study => study.cancelling ? "stopping" : study.state;
+const failedOf = study => study.failed_cells ? ` (${study.failed_cells} cell${study.failed_cells === 1 ? "" : "s"} failed)` : "";
+const stateOf = study => study.cancelling ? "cancelling" : study.state;
 
 // ---- a new study
 
@@ -293,7 +301,7 @@ function study(id) {
       active && !found.cancelling ? act("Cancel", () => post(`${path}/cancel`, "")) : null,
       found.state === "cancelled" || found.state === "failed" ? act("Resume", () => post(`${path}/resume`, ""), "main") : null,
       found.state !== "running" ? act("Remove", async () => {
-        if (!confirm(`Remove the study ${found.name} with all its results?`)) return;
+        if (!confirm(`Remove the study ${clean(found.name)} with all its results?`)) return;
         await ask(path, { method: "DELETE" });
         location.hash = "#/new";
       }) : null].filter(Boolean));
@@ -340,7 +348,7 @@ function study(id) {
   }
   async function poll() {
     const found = await get(`/api/studies/${id}`);
-    title.textContent = found.name;
+    title.textContent = clean(found.name);
     state.textContent = stateOf(found);
     state.className = `state ${found.state}`;
     reason.textContent = found.reason === found.state ? "" : found.reason;
