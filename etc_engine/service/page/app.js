@@ -346,17 +346,20 @@ function study(id) {
     if (curve.bounds_broken) models.prepend(h("p", { class: "error" }, "A rigorous bound is broken: look at the report."));
     if (focused && $(focused)) $(focused).focus();
   }
+  // The packings of the figure, so that the page tells one number: the queue counts on while a figure is made.
+  function fillCounts(found) {
+    const done = units < 0 ? found.done : units, more = found.most > found.planned ? ` (adaptive: ${found.most} at most)` : "";
+    bar.max = found.planned; bar.value = done;
+    counts.replaceChildren(state, ` – ${done} of ${found.planned} packings${more}${failedOf(found)}`);
+  }
   async function poll() {
     const found = await get(`/api/studies/${id}`);
     title.textContent = clean(found.name);
     state.textContent = stateOf(found);
     state.className = `state ${found.state}`;
     reason.textContent = found.reason === found.state ? "" : found.reason;
-    bar.max = found.planned; bar.value = found.done;
     bar.hidden = found.state === "done";
-    const failed = found.failed_cells ? `, ${found.failed_cells} results without a conductivity` : "";
-    const more = found.most > found.planned ? ` (adaptive: ${found.most} at most)` : "";
-    counts.replaceChildren(state, ` – ${found.done} of ${found.planned} packings${more}${failed}`);
+    fillCounts(found);
     log.textContent = found.log || "nothing yet";
     fillButtons(found);
     const version = `${found.state} ${found.done}`;
@@ -366,6 +369,7 @@ function study(id) {
       units = curve.units;
       lagging = found.state === "running" && units < found.done;
       drawn = version;
+      fillCounts(found);
     }
     return found.state === "running" || found.state === "queued";
   }
@@ -383,7 +387,7 @@ function facts(entries) {
 
 function solve() {
   const field = (id, label, control, hint) => h("div", { class: "field" }, h("label", { for: id }, label), control, h("p", { class: "hint" }, hint));
-  const input = (id, value, hint, label) => field(id, label, h("input", { id, name: id, value, autocomplete: "off" }), hint);
+  const input = (id, placeholder, hint, label) => field(id, label, h("input", { id, name: id, placeholder, autocomplete: "off" }), hint);
   const answer = h("div", { "aria-live": "polite" }), button = h("button", { class: "main" }, "Solve");
   const form = h("form", { novalidate: true }, h("fieldset", {}, h("legend", {}, "Particles"), h("div", { class: "fields" },
     field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS dump"),
