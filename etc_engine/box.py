@@ -49,6 +49,8 @@ class Box:
             )
         if not all(np.isfinite(length) and length > 0.0 for length in self.lengths):
             raise InputError(f"the edge lengths of a box must be positive and finite, found {self.lengths}")
+        if not all(1e-100 <= length <= 1e100 for length in self.lengths):
+            raise InputError(f"the edge lengths of a box must lie between 1e-100 and 1e100, found {self.lengths}")
 
     @property
     def dimension(self) -> int:

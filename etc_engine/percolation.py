@@ -109,6 +109,45 @@ def restore_dead_ends(network: ContactNetwork, backbone: Backbone) -> Backbone:
     )
 
 
+def joined_axes(
+    n: int,
+    pairs: NDArray[np.int64],
+    shifts: NDArray[np.int64],
+    wall_nodes: NDArray[np.int64],
+    walls: NDArray[np.int64],
+    box: Box,
+) -> tuple[int, ...]:
+    """Axes along which linked nodes join: wrap around the box, or touch both of its walls.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes.
+    pairs : ndarray of int, shape (m, 2)
+        Linked nodes.
+    shifts : ndarray of int, shape (m, d)
+        The image of j linked to i lies at ``x_j + shift * lengths``.
+    wall_nodes, walls : ndarray of int, shape (w,)
+        Node and wall of each link to a wall; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end.
+    box : Box
+
+    Returns
+    -------
+    tuple of int
+
+    Examples
+    --------
+    >>> none = np.zeros(0, dtype=np.int64)
+    >>> joined_axes(1, np.array([[0, 0]]), np.array([[1, 0]]), none, none, Box((1.0, 1.0), (True, True)))
+    (0,)
+    """
+    clusters, winding = _clusters(n, pairs, shifts)
+    touches = np.zeros((n, 2 * box.dimension), dtype=np.bool_)
+    touches[clusters[wall_nodes], walls] = True
+    spanning = np.where(box.periodic, winding, touches[:, 0::2] & touches[:, 1::2])
+    return tuple(int(axis) for axis in np.flatnonzero(spanning.any(axis=0)))
+
+
 def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
     """Load axes that share a matrix: each walled axis alone, all periodic axes together if no axis is walled.
 

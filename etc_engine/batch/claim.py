@@ -9,7 +9,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from etc_engine.batch.lock import Lock
 from etc_engine.batch.provenance import Run, engine_commit, engine_version, this_run
@@ -74,14 +74,14 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
         what = f"finished units of {output}" if shards else f"{output}"
         raise OutputError(f"{what} exist{'' if shards else 's'}: go on with --resume, or start anew with --overwrite")
     if policy == "resume" and not shards and output.exists():
-        _refuse_other_study(study, *_study_of_output(output), str(output))
+        refuse_other_study(study, *_study_of_output(output), str(output))
         return Claim(study, text, output, run, complete=True)
     remarks: tuple[str, ...] = ()
     if policy == "resume" and shards:
         found = read_study_file(folder)
         if found is None:
             raise StudyError(f"{folder} does not say which study its units belong to: start anew with --overwrite")
-        _refuse_other_study(study, *found, str(folder))
+        refuse_other_study(study, *found, str(folder))
         remarks = _other_engines(folder)
     else:
         clear_folder(folder)
@@ -149,7 +149,33 @@ def _study_of_output(output: Path) -> tuple[str, dict[str, Any]]:
     return attributes["study_digest"], json.loads(attributes["study_resolved"])
 
 
-def _refuse_other_study(study: Study, digest: str, identity: Mapping[str, Any], place: str) -> None:
+class Identified(Protocol):
+    """A study that says what decides its numbers."""
+
+    def identity(self) -> dict[str, Any]:
+        """What decides the numbers, as plain values."""
+
+    def digest(self) -> str:
+        """SHA-256 of the identity."""
+
+
+def refuse_other_study(study: Identified, digest: str, identity: Mapping[str, Any], place: str) -> None:
+    """Refuse a place that holds the numbers of another study than this one.
+
+    Parameters
+    ----------
+    study : Study, or a study of another command
+    digest : str
+    identity : mapping
+        Of the study that ``place`` belongs to.
+    place : str
+        For the message.
+
+    Raises
+    ------
+    StudyError
+        It names the first key that differs.
+    """
     if digest == study.digest():
         return
     wanted = study.identity()

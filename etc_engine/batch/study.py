@@ -5,14 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Sequence
-from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, model_validator
-from pydantic_core import ErrorDetails
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from etc_engine.batch.study_tables import (
     CompositeTable,
@@ -21,21 +18,33 @@ from etc_engine.batch.study_tables import (
     ModelsTable,
     PackingTable,
     StatisticsTable,
-    StudyTable,
-    Word,
     distribution,
 )
 from etc_engine.box import Box, parse_periodic
 from etc_engine.errors import StudyError
 from etc_engine.packing import PackingSpec
 from etc_engine.realization import ENGINES, CompositeSpec, ConductionSpec, ContactSpec, Mixture, RealizationSpec
+from etc_engine.schema import StudyTable, Word, first_problem
+
+HINTS = {"conduction.pipe_resistance": "engine = 'pipe' has method = 'chord' or 'uniform', the resistance of its pipes"}
+"""What to say of keys that other commands have."""
+
+LONGEST_NAME = 80
+
+
+def _printable(name: str) -> str:
+    """Names stand in tables and on terminals."""
+    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
+        shown = name if len(name) <= LONGEST_NAME else f"{name[:20]}... ({len(name)} characters)"
+        raise ValueError(f"found {shown!r}, allowed: 1 to {LONGEST_NAME} printable characters")
+    return name
 
 
 class Study(StudyTable):
     """A sweep: densities x contact angles (or contrasts) x methods x realizations of one kind of packing."""
 
     schema_: Literal[1] = Field(alias="schema", description="1")
-    name: Word = Field(description="a name")
+    name: Annotated[Word, AfterValidator(_printable)] = Field(description="a name of 1 to 80 printable characters")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = Field(description="a whole number from 0 to 2**63 - 1")
     packing: PackingTable = Field(description="a table")
     contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
@@ -193,57 +202,9 @@ def parse_study(text: str, source: str = "study") -> Study:
     """
     try:
         values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # beside its own errors: numbers of 5000 digits, lists 3000 deep
         raise StudyError(f"{source}: is not valid TOML: {error}") from None
     try:
         return Study.model_validate(values)
     except ValidationError as error:
-        raise StudyError(f"{source}: {_one_line(error)}") from None
-
-
-def _one_line(error: ValidationError) -> str:
-    """The first problem in words; unknown keys first, since they often explain a missing one."""
-    details = sorted(error.errors(), key=lambda detail: detail["type"] != "extra_forbidden")
-    places = {_field(detail["loc"])[0] for detail in details}
-    more = f" (and {len(places) - 1} more problem{'s' * (len(places) > 2)})" if len(places) > 1 else ""
-    return _describe(details[0]) + more
-
-
-def _describe(detail: ErrorDetails) -> str:
-    key, table, allowed = _field(detail["loc"])
-    if detail["type"] == "extra_forbidden":
-        names = [field.alias or name for name, field in table.model_fields.items()]
-        near = get_close_matches(str(detail["loc"][-1]), names, 1)
-        hint = f", did you mean {near[0]!r}?" if near else ","
-        return f"{key}: unknown key{hint} allowed: {', '.join(names)}"
-    if detail["type"] == "missing":
-        return f"{key}: missing, expected {allowed}"
-    if detail["type"] == "value_error":  # our own checks, which say it all
-        reason = str(detail["ctx"]["error"])
-        return f"{key}: {reason}" if key else reason
-    return f"{key}: found {detail['input']!r}, allowed: {allowed}"
-
-
-def _field(location: Sequence[int | str]) -> tuple[str, type[BaseModel], str]:
-    """Name of the key at an error's location, the table it is in, and what the key allows."""
-    table: type[BaseModel] = Study
-    words: list[str] = []
-    allowed = "a table"
-    for step in location:
-        field = next((f for n, f in table.model_fields.items() if step in (n, f.alias)), None)
-        words.append(str(step))
-        if field is None:  # an unknown key
-            break
-        allowed = field.description or allowed
-        inner = _table_in(field.annotation)
-        if inner is None:
-            break
-        table = inner
-    places = [f"[{step}]" for step in location[len(words) :] if isinstance(step, int)]
-    return ".".join(words) + "".join(places), table, allowed
-
-
-def _table_in(annotation: Any) -> type[BaseModel] | None:
-    """The table that a field holds, or may hold."""
-    kinds = get_args(annotation) or (annotation,)
-    return next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
+        raise StudyError(f"{source}: {first_problem(error, Study, HINTS)}") from None

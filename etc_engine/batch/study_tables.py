@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from etc_engine.box import parse_periodic
 from etc_engine.errors import InputError
@@ -12,6 +12,7 @@ from etc_engine.models.catalogue import find_model
 from etc_engine.packing import METHODS as PACKING_METHODS
 from etc_engine.packing import RadiusDistribution, parse_radii
 from etc_engine.realization import ENGINES
+from etc_engine.schema import StudyTable, Word
 
 DEFAULT_CAP = 10
 """Without ``max_realizations`` an adaptive sweep stops at this many times ``realizations``."""
@@ -39,17 +40,11 @@ def _known_engine(word: str) -> str:
     return word
 
 
-Positive = Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
+# squares and products of what a study says must stay finite
+Positive = Annotated[float, Field(strict=True, ge=1e-100, le=1e100)]
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(strict=True, gt=0.0, lt=1.0)]
-Word = Annotated[str, Field(strict=True)]
-
-
-class StudyTable(BaseModel):
-    """A table of the study file. The description of a field says what is allowed, for the error line."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class PackingTable(StudyTable):

@@ -6,11 +6,16 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from etc_engine.errors import InputError, OutputError, StudyError
+
+if TYPE_CHECKING:
+    import xarray
+
+    from etc_engine.transient.study import NetworkStudy
 
 EXIT_RESUMABLE = 75
 
@@ -50,12 +55,13 @@ def transient_command(
 
 
 def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import replacing
+    from etc_engine.cli.options import check_place, replacing
     from etc_engine.meshless.study import run_study
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
             raise InputError(f"{name} goes with studies of kind 'network', this one is of kind 'meshless'")
+    check_place(wanted.output, wanted.study)
     result = run_study(content)
     with replacing(wanted.output) as file:
         result.assign_attrs(study_file=wanted.text).to_netcdf(file)
@@ -64,33 +70,28 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
 
 
 def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import check_picture, check_place, replacing
+    from etc_engine.cli.options import replacing
     from etc_engine.cli.progress import PackingProgress
-    from etc_engine.results.series import series_dataset, write_vtk_series
+    from etc_engine.results.series import series_dataset
     from etc_engine.transient.run import run_transient
-    from etc_engine.transient.states import remove_states, state_folder
+    from etc_engine.transient.states import remove_states, state_folder, state_path
     from etc_engine.transient.study import parse_study
 
-    if wanted.plot is not None:
-        check_picture(wanted.plot)
-    if wanted.vtk is not None and wanted.vtk.suffix != ".pvd":
-        raise InputError(f"a VTK series is written to a .pvd file, found {str(wanted.vtk)!r}")
-    for path in (wanted.output, wanted.plot, wanted.vtk):
-        if path is not None:
-            check_place(path, wanted.study)
-    if wanted.resume and wanted.output.exists() and not state_folder(wanted.output).exists():
-        click.echo(f"{wanted.output} is complete: nothing is left to do", err=True)
-        return 0
-    if state_folder(wanted.output).exists() and not (wanted.resume or wanted.overwrite):
-        raise OutputError(f"{state_folder(wanted.output)} holds states of a former run: give --resume or --overwrite")
     study = parse_study(content)
+    _check_outputs(study, wanted)
+    states = state_folder(wanted.output)
+    if wanted.resume and wanted.output.exists() and not states.exists():
+        return _finish(study, wanted)
+    if states.exists() and not (wanted.resume or wanted.overwrite):
+        raise OutputError(f"{states} holds states of a former run: give --resume or --overwrite")
     try:
         with PackingProgress("marching") as progress:
             done = run_transient(
                 study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report
             )
     except InputError:
-        if not wanted.resume:  # what was refused leaves nothing behind
+        # what was refused leaves nothing behind, unless there is more than the start to go on from
+        if not wanted.resume and not state_path(states, 1).exists():
             remove_states(wanted.output)
         raise
     if done.stopped:
@@ -101,13 +102,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         )
         return EXIT_RESUMABLE
     series = series_dataset(done, wanted.text)
-    if wanted.plot is not None:
-        from etc_engine.figures.transient import save_transient
-
-        with replacing(wanted.plot) as file:
-            save_transient(series, file)
-    if wanted.vtk is not None:
-        write_vtk_series(wanted.vtk, series)
+    _draw(series, wanted)
     with replacing(wanted.output) as file:
         series.to_netcdf(file)
     remove_states(wanted.output)
@@ -119,6 +114,57 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         err=True,
     )
     return 0
+
+
+def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
+    """Refuse what cannot be written, or would replace an input, before the work begins."""
+    from etc_engine.cli.options import check_picture, check_place
+    from etc_engine.results.series import check_vtk_series
+
+    inputs = [wanted.study]
+    if study.particles is not None:
+        inputs.append(wanted.study.parent / study.particles)
+    if wanted.plot is not None:
+        check_picture(wanted.plot)
+    if wanted.vtk is not None:
+        check_vtk_series(wanted.vtk, overwrite=wanted.overwrite)
+        folder = wanted.vtk.with_suffix("").resolve()
+        if any(path.resolve().parent == folder for path in inputs):
+            raise OutputError(f"the frames of {wanted.vtk} go to the folder of the input: choose another name")
+    for path in (wanted.output, wanted.plot, wanted.vtk):
+        if path is not None:
+            check_place(path, *inputs)
+
+
+def _finish(study: NetworkStudy, wanted: Wanted) -> int:
+    """A complete output: see that it is of this study, and draw what is asked for."""
+    import json
+
+    from etc_engine.batch.claim import refuse_other_study
+    from etc_engine.batch.dataset import open_dataset
+
+    series = open_dataset(wanted.output)
+    found = json.loads(series.attrs.get("study_resolved", "{}"))
+    refuse_other_study(study, series.attrs["study_digest"], found, str(wanted.output))
+    drawn = _draw(series, wanted)
+    click.echo(f"{wanted.output} is complete: {drawn or 'nothing is left to do'}", err=True)
+    return 0
+
+
+def _draw(series: xarray.Dataset, wanted: Wanted) -> str:
+    """Write the picture and the VTK series that are asked for; what was written, in words."""
+    from etc_engine.cli.options import replacing
+    from etc_engine.results.series import write_vtk_series
+
+    if wanted.plot is not None:
+        from etc_engine.figures.transient import save_transient
+
+        with replacing(wanted.plot) as file:
+            save_transient(series, file)
+    if wanted.vtk is not None:
+        write_vtk_series(wanted.vtk, series)
+    written = [str(path) for path in (wanted.plot, wanted.vtk) if path is not None]
+    return f"{' and '.join(written)} drawn from it" if written else ""
 
 
 KINDS: dict[str, Callable[[dict[str, Any], Wanted], int]] = {"meshless": _run_meshless, "network": _run_network}

@@ -16,6 +16,9 @@ from etc_engine.errors import InputError
 from etc_engine.percolation import Backbone, find_backbone, restore_dead_ends
 from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
 
+LARGEST = 1e100
+"""Of a conductivity or resistance: products of a few of them stay finite."""
+
 
 @dataclass(frozen=True, eq=False)
 class SteadySolution:
@@ -223,8 +226,10 @@ def _positive(values: ArrayLike, size: int, name: str, *, zero: bool) -> NDArray
     array = np.asarray(values, dtype=np.float64)
     if array.ndim and array.shape != (size,):
         raise InputError(f"the {name} must be one number or an array of shape ({size},), found {array.shape}")
-    bad = ~np.isfinite(array) | ((array < 0.0) if zero else (array <= 0.0))
+    bad = ~(np.abs(array) <= LARGEST) | ((array < 0.0) if zero else (array < 1.0 / LARGEST))
     if bad.any():
         found = array[bad].flat[0]
+        if found > 0.0 and np.isfinite(found):
+            raise InputError(f"the {name} must lie between {1.0 / LARGEST:g} and {LARGEST:g}, found {found:g}")
         raise InputError(f"the {name} must be {'>= 0' if zero else 'positive'} and finite, found {found:g}")
     return np.broadcast_to(array, (size,))

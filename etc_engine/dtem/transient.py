@@ -257,21 +257,28 @@ def _heat_system(
     fold = csr_matrix((np.ones(free.size), (np.arange(free.size), walls.unknowns[free])), shape=(free.size, walls.size))
     plates = np.flatnonzero(walls.plates >= 0)
     exchange = np.zeros(walls.size)
-    exchange[walls.plates[plates]] = walls.exchange[plates]
-    matrix = csr_matrix(fold.T @ system.matrix @ fold + diags_array(exchange))
+    nodes = walls.plates[plates]
+    exchange[nodes] = walls.exchange[plates]
+    elements_alone = csr_matrix(fold.T @ system.matrix @ fold)
+    matrix = csr_matrix(elements_alone + diags_array(exchange))
     matrix.sort_indices()
+    behind = elements_alone[nodes]
+    # film and elements of a plate are in series: the smaller conductance has the larger, more exact difference
+    by_film = exchange[nodes] <= elements_alone.diagonal()[nodes]
     links = np.asarray(fold.T @ system.rhs)  # conductances between unknowns and walls of given temperature
     own = lift.T @ elements.apply(lift)
 
     def load(t: float) -> NDArray[np.float64]:
         f = links @ walls.temperatures(t)
         f[walls.size - capacities.size :] += source(t)
-        f[walls.plates[plates]] += walls.plate_heat(t)[plates]
+        f[nodes] += walls.plate_heat(t)[plates]
         return np.asarray(f)
 
     def heat_rates(t: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
         rates = walls.plate_heat(t) + own @ walls.temperatures(t) - links.T @ temperatures
-        rates[plates] -= (exchange * temperatures)[walls.plates[plates]]
+        through_film = rates[plates] - (exchange * temperatures)[nodes]
+        into_elements = behind @ temperatures - (links @ walls.temperatures(t))[nodes]
+        rates[plates] = np.where(by_film, through_film, into_elements)
         return np.append(rates, source(t).sum())
 
     capacity = np.concatenate([np.zeros(walls.size - capacities.size), capacities])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.box import Box
+from etc_engine.box import AXES, Box
 from etc_engine.composite import MATRIX, Composite, Homogenized
 from etc_engine.errors import GeometryError, InputError, PackingError
 from etc_engine.lattice.calibration import pack_lattice
@@ -23,6 +23,7 @@ from etc_engine.lattice.network import (
 )
 from etc_engine.lattice.steady import LatticeConductivity, conductivity_tensor
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.percolation import joined_axes
 
 BOUNDARIES = ("periodic", "walls")
 """Boundary conditions of a cell."""
@@ -63,7 +64,7 @@ def homogenize_lattice(
     ----------
     composite : Composite
         Spheres in a matrix. Insulating spheres take no part; perfectly conducting ones have 1e8 times the largest
-        finite conductivity.
+        finite conductivity, and are refused where they join across the cell.
     rng : numpy.random.Generator
         Source of the lattice.
     particles : int
@@ -228,6 +229,7 @@ def _conduct(
     tolerance: float,
 ) -> _Conducted:
     made = composite_lattice(composite, particles, rng, boundary=boundary, transmission=transmission)
+    _refuse_joined(composite, made, interface_resistance)
     k = node_conductivities(composite, made.owner)
     conductances = link_conductances(made.lattice, k, interface_resistance=interface_resistance, phase=made.owner)
     result = conductivity_tensor(made.lattice, conductances, tolerance=tolerance)
@@ -236,6 +238,33 @@ def _conduct(
         scale = np.sqrt(np.diag(bare.tensor))
         result = LatticeConductivity(result.tensor / np.outer(scale, scale), result.fields)
     return _Conducted(result, made.volume_fraction, made.lattice.count)
+
+
+def _refuse_joined(composite: Composite, made: CompositeLattice, interface_resistance: float) -> None:
+    """Refuse perfect conductors whose particles are linked all the way across the cell."""
+    perfect = np.append(np.isinf(composite.inclusion), False)[made.owner]
+    if not perfect.any():
+        return
+    lattice = made.lattice
+    i, j = lattice.pairs.T
+    linked = perfect[i] & perfect[j] & (lattice.sections > 0.0)
+    if interface_resistance > 0.0:
+        linked &= made.owner[i] == made.owner[j]
+    ends = perfect[lattice.wall_nodes]
+    joined = joined_axes(
+        lattice.count,
+        lattice.pairs[linked],
+        lattice.shifts[linked],
+        lattice.wall_nodes[ends],
+        lattice.walls[ends],
+        lattice.packing.box,
+    )
+    if joined:
+        raise GeometryError(
+            f"perfect conductors (inf) join across the cell along {AXES[joined[0]]} in a lattice of {lattice.count} "
+            "particles: the effective conductivity is infinite; give them a finite conductivity, or, where they are "
+            "apart, more particles"
+        )
 
 
 def _refuse(composite: Composite, particles: int, boundary: str, transmission: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, Tag, ValidationError, model_validator
 
 from etc_engine.errors import InputError, StudyError
 from etc_engine.meshless.contact_heating import ContactArc, heat_disk_through_arcs
@@ -15,28 +15,41 @@ from etc_engine.meshless.domain import Disk
 from etc_engine.meshless.problem import BoundaryCondition, Convective, Data, Dirichlet, HeatProblem, Neumann
 from etc_engine.meshless.radial_basis import PolyharmonicSpline
 from etc_engine.meshless.solve import solve_transient
+from etc_engine.schema import (
+    AS_NUMBER,
+    AS_TABLE,
+    MOST_STEPS,
+    NUMBER,
+    POSITIVE,
+    SMALLEST,
+    WRITTEN,
+    Number,
+    Positive,
+    StudyTable,
+    Times,
+    Word,
+    first_problem,
+)
 
 if TYPE_CHECKING:
     import xarray
 
-Positive = Annotated[float, Field(gt=0.0)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Point = tuple[Number, Number]
+Count = Annotated[int, Field(strict=True, ge=1, le=10**6)]
+A_VALUE = f"{NUMBER}, or a table {{ times = [...], values = [...] }}"
+A_COUNT = "a whole number of at least 1"
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class TimeTable(_Strict):
+class TimeTable(StudyTable):
     """Values at increasing times, linear in between and constant outside."""
 
-    times: list[Finite] = Field(min_length=2)
-    values: list[Finite] = Field(min_length=2)
+    times: Times = Field(min_length=2, description=f"at least two times [s], each {NUMBER}")
+    values: list[Number] = Field(min_length=2, description=f"at least two values, each {NUMBER}")
 
     @model_validator(mode="after")
     def _check(self) -> TimeTable:
-        if len(self.times) != len(self.values) or any(np.diff(self.times) <= 0.0):
-            raise ValueError("a table needs increasing times and as many values")
+        if len(self.times) != len(self.values):
+            raise ValueError(f"a table needs as many values as times, found {len(self.values)} and {len(self.times)}")
         return self
 
     def at(self, t: float) -> float:
@@ -44,82 +57,106 @@ class TimeTable(_Strict):
         return float(np.interp(t, self.times, self.values))
 
 
-Value = Finite | TimeTable
+Value = Annotated[Annotated[Number, Tag(AS_NUMBER)] | Annotated[TimeTable, Tag(AS_TABLE)], WRITTEN]
 
 
-class DiskShape(_Strict):
+class DiskShape(StudyTable):
     """A disk; ``breaks`` [degree] cut its circle into edges."""
 
-    center: tuple[Finite, Finite] = (0.0, 0.0)
-    radius: Positive
-    breaks: list[Finite] = []
+    center: Point = Field(default=(0.0, 0.0), description=f"two numbers [m], each {NUMBER}")
+    radius: Positive = Field(description=f"{POSITIVE} [m]")
+    breaks: list[Number] = Field(default=[], description="a list of angles [degree]")
 
 
-class Body(_Strict):
+class Body(StudyTable):
     """Shape, material, uniform source and uniform initial temperature (SI units)."""
 
-    vertices: list[tuple[Finite, Finite]] | None = None
-    disk: DiskShape | None = None
-    conductivity: Positive
-    heat_capacity: Positive
-    initial: Finite
-    source: Value = 0.0
+    vertices: list[Point] | None = Field(default=None, description="a list of points [x, y] [m]")
+    disk: DiskShape | None = Field(default=None, description="a table with a radius")
+    conductivity: Positive = Field(description=f"{POSITIVE} [W/(m K)]")
+    heat_capacity: Positive = Field(description=f"{POSITIVE}, rho c [J/(m3 K)]")
+    initial: Number = Field(description=f"{NUMBER} [K]")
+    source: Value = Field(default=0.0, description=f"{A_VALUE} [W/m3]")
 
 
-class Edge(_Strict):
+class Edge(StudyTable):
     """Boundary condition of one edge."""
 
-    type: Literal["dirichlet", "neumann", "convective"]
-    value: Value = Field(description="temperature [K], heat flux into the body [W/m2] or ambient temperature [K]")
-    coefficient: Positive | None = Field(default=None, description="heat transfer coefficient [W/(m2 K)]")
+    type: Literal["dirichlet", "neumann", "convective"] = Field(description="dirichlet, neumann or convective")
+    value: Value = Field(
+        description=f"{A_VALUE}: temperature [K], heat flux into the body [W/m2] or ambient temperature [K]"
+    )
+    coefficient: Positive | None = Field(
+        default=None, description=f"{POSITIVE}, the heat transfer coefficient [W/(m2 K)]"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Edge:
-        if (self.type == "convective") != (self.coefficient is not None):
-            raise ValueError("a coefficient goes with type = 'convective', and only with it")
+        if self.type == "convective" and self.coefficient is None:
+            raise ValueError("coefficient: missing, type = 'convective' needs one [W/(m2 K)]")
+        if self.type != "convective" and self.coefficient is not None:
+            raise ValueError(f"coefficient: has no meaning with type = {self.type!r}, take it out")
         return self
 
 
-class Contact(_Strict):
+class Contact(StudyTable):
     """A contact arc of a disk: angles in degrees, heat per unit thickness [W/m]."""
 
-    angle: Finite
-    half_angle: Annotated[float, Field(gt=0.0, lt=90.0)]
-    heat: Value
+    angle: Number = Field(description=f"{NUMBER} [degree]")
+    half_angle: Annotated[float, Field(strict=True, gt=0.0, lt=90.0)] = Field(
+        description="an angle between 0 and 90 degrees, both excluded"
+    )
+    heat: Value = Field(description=f"{A_VALUE} [W/m]")
 
 
-class Output(_Strict):
+class Output(StudyTable):
     """Output times [s], and points [m] or a square grid of about ``grid`` points a side."""
 
-    times: list[Finite] = Field(min_length=1)
-    points: list[tuple[Finite, Finite]] = []
-    grid: int | None = Field(default=None, ge=2, le=400)
+    times: Times = Field(min_length=1, description=f"a list of times [s], each {NUMBER}")
+    points: list[Point] = Field(default=[], description="a list of points [x, y] [m]")
+    grid: Annotated[int, Field(strict=True, ge=2, le=400)] | None = Field(
+        default=None, description="a whole number from 2 to 400"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Output:
+        if self.times[0] != 0.0 and abs(self.times[0]) < SMALLEST:
+            raise ValueError(f"times: the first is 0 or at least {SMALLEST:g} s, found {self.times[0]:g}")
+        return self
 
 
-class Solver(_Strict):
+class Solver(StudyTable):
     """Method, scheme and discretization; what is left out takes the defaults of the solver."""
 
-    method: Literal["trefftz", "mfs"] = "trefftz"
-    scheme: Literal["sdirk2", "bdf2", "crank-nicolson", "backward-euler", "laplace"] = "sdirk2"
-    steps: int = Field(default=100, ge=1)
-    boundary_nodes: int | None = Field(default=None, ge=3)
-    interior_nodes: int | None = Field(default=None, ge=1)
-    spacing: Literal["chebyshev", "uniform"] = "chebyshev"
-    spline_order: int = Field(default=2, ge=1, le=5)
-    functions: int | None = Field(default=None, ge=1)
-    source_offset: Positive | None = None
+    method: Literal["trefftz", "mfs"] = Field(default="trefftz", description="trefftz or mfs")
+    scheme: Literal["sdirk2", "bdf2", "crank-nicolson", "backward-euler", "laplace"] = Field(
+        default="sdirk2", description="sdirk2, bdf2, crank-nicolson, backward-euler or laplace"
+    )
+    steps: Annotated[int, Field(strict=True, ge=1, le=MOST_STEPS)] = Field(
+        default=100, description=f"a whole number from 1 to {MOST_STEPS:.0e}, of steps in total"
+    )
+    boundary_nodes: Annotated[Count, Field(ge=3)] | None = Field(
+        default=None, description="a whole number of at least 3"
+    )
+    interior_nodes: Count | None = Field(default=None, description=A_COUNT)
+    spacing: Literal["chebyshev", "uniform"] = Field(default="chebyshev", description="chebyshev or uniform")
+    spline_order: Annotated[int, Field(strict=True, ge=1, le=5)] = Field(
+        default=2, description="a whole number from 1 to 5"
+    )
+    functions: Count | None = Field(default=None, description=A_COUNT)
+    source_offset: Positive | None = Field(default=None, description=POSITIVE)
 
 
-class MeshlessStudy(_Strict):
+class MeshlessStudy(StudyTable):
     """A transient study of kind "meshless"."""
 
-    schema_version: Literal[1] = Field(alias="schema")
-    kind: Literal["meshless"]
-    name: str
-    body: Body
-    boundary: list[Edge] = []
-    contact: list[Contact] = []
-    output: Output
+    schema_version: Literal[1] = Field(alias="schema", description="1")
+    kind: Literal["meshless"] = Field(description="meshless")
+    name: Word = Field(description="a name")
+    body: Body = Field(description="a table of shape and material")
+    boundary: list[Edge] = Field(default=[], description="tables [[boundary]], one for each edge")
+    contact: list[Contact] = Field(default=[], description="tables [[contact]], one for each arc")
+    output: Output = Field(description="a table with times, and points or a grid")
     solver: Solver = Solver()
 
     @model_validator(mode="after")
@@ -148,10 +185,7 @@ def parse_study(content: Mapping[str, Any]) -> MeshlessStudy:
     try:
         return MeshlessStudy.model_validate(dict(content))
     except ValidationError as error:
-        first, count = error.errors()[0], error.error_count()
-        place = ".".join(str(part) for part in first["loc"]) or "the study"
-        more = f" (and {count - 1} more)" if count > 1 else ""
-        raise StudyError(f"{place}: {first['msg'].removeprefix('Value error, ')}{more}") from error
+        raise StudyError(first_problem(error, MeshlessStudy)) from None
 
 
 def run_study(content: Mapping[str, Any]) -> xarray.Dataset:

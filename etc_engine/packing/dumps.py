@@ -181,13 +181,14 @@ def _frames(path: Path) -> Iterator[_Frame]:
         raise InputError(f"there is no file {path}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path} cannot be read as a text dump: {error}") from None
-    lines = iter(text.splitlines())
+    lines = iter(text.splitlines(keepends=True))
     number = 0
     for line in lines:
         if not line.strip():
             continue
         if line.strip() != "ITEM: TIMESTEP":
-            raise InputError(f"{path} is not a LAMMPS text dump: expected 'ITEM: TIMESTEP', found {line[:40]!r}")
+            found = line.rstrip()[:40]
+            raise InputError(f"{path} is not a LAMMPS text dump: expected 'ITEM: TIMESTEP', found {found!r}")
         try:
             yield _frame(lines)
         except (StopIteration, ValueError, IndexError):
@@ -210,6 +211,8 @@ def _frame(lines: Iterator[str]) -> _Frame:
     if columns[:2] != ["ITEM:", "ATOMS"]:
         raise ValueError
     atoms = [next(lines) for _ in range(count)]
+    if atoms and not atoms[-1].endswith("\n"):  # a number may have lost its last digits
+        raise ValueError
     return _Frame(timestep, box_header[3:], box_lines, columns[2:], atoms)
 
 
@@ -222,7 +225,7 @@ def _particles(path: Path, frame: _Frame) -> ParticleTable:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # an empty table is refused below, in our words
-            values = np.loadtxt(io.StringIO("\n".join(frame.atoms)), ndmin=2)
+            values = np.loadtxt(io.StringIO("".join(frame.atoms)), ndmin=2)
     except ValueError as error:
         raise InputError(f"{path}: the frame at step {frame.timestep} is not a table of numbers: {error}") from None
     if len(values) != len(frame.atoms):

@@ -18,6 +18,10 @@ def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return values
 
 
+LARGEST = 1e6
+"""Radii above this, in edge lengths of the box, are mistakes."""
+
+
 @dataclass(frozen=True, eq=False)
 class ParticlePacking:
     """Disks (2D) or spheres (3D) in a box.
@@ -61,6 +65,8 @@ class ParticlePacking:
         _refuse_first(~np.isfinite(centers).all(axis=1), "has a centre that is not finite", centers)
         _refuse_first(~np.isfinite(radii), "has a radius that is not finite", radii)
         _refuse_first(radii <= 0.0, "has a radius that is not positive", radii)
+        beyond = LARGEST * max(self.box.lengths)
+        _refuse_first(radii > beyond, f"has a radius beyond {LARGEST:g} times the box {self.box.lengths}", radii)
         centers = self.box.wrap(centers)
         outside = ((centers < 0.0) | (centers > np.asarray(self.box.lengths))).any(axis=1)
         _refuse_first(outside, f"has its centre outside the box {self.box.lengths}", centers)

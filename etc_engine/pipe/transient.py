@@ -200,6 +200,10 @@ def _heat_system(
     """Loads and heat flows of the walls; ``links`` join particles to walls of given temperature."""
     n = links.shape[0]
     totals = np.asarray(links.sum(axis=0)).ravel()
+    joined = csr_matrix(-matrix[n:, :n])
+    joints = np.asarray(joined.sum(axis=1)).ravel()
+    # film and contacts of a plate are in series: the smaller conductance has the larger, more exact difference
+    by_film = films <= joints
 
     def given(t: float) -> NDArray[np.float64]:
         return np.array([c.temperature(t) if isinstance(c, FixedTemperature) else 0.0 for c in conditions])
@@ -219,7 +223,8 @@ def _heat_system(
 
     def heat_rates(t: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
         rates = totals * given(t) - links.T @ temperatures[:n]
-        rates[plates] = into_plates(t) - films * temperatures[n:]
+        through_film = into_plates(t) - films * temperatures[n:]
+        rates[plates] = np.where(by_film, through_film, joints * temperatures[n:] - joined @ temperatures[:n])
         return np.append(rates, source(t).sum())
 
     return HeatSystem(capacity, matrix, load, heat_rates)

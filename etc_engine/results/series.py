@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -151,6 +152,25 @@ def particle_capacities(transient: Transient) -> NDArray[np.float64]:
     return np.asarray(rows.reshape(n, -1).sum(axis=1))
 
 
+def check_vtk_series(path: Path, *, overwrite: bool = False) -> None:
+    """Refuse a place of a VTK series that is not named so, or that holds frames of another one.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in ``.pvd``.
+    OutputError
+        If the folder of the frames holds ``.vtp`` files already and is not to be overwritten.
+    """
+    if path.suffix != ".pvd":
+        raise InputError(f"a VTK series is written to a .pvd file, found {str(path)!r}")
+    folder = path.with_suffix("")
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"cannot write {path}: {folder}, the folder of its frames, is a file")
+    if not overwrite and any(folder.glob("*.vtp")):
+        raise OutputError(f"{folder} holds .vtp files already: choose another name, or give --overwrite")
+
+
 def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
     """Write a ``.pvd`` collection, and beside it a folder of ``.vtp`` files, one an output time.
 
@@ -159,7 +179,7 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
     Parameters
     ----------
     path : Path
-        Ends in ``.pvd``; the files go into the folder of that name without the ending.
+        Ends in ``.pvd``; the files go into the folder of that name without the ending, in place of former frames.
     series : xarray.Dataset
         From `series_dataset`.
 
@@ -170,8 +190,7 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
     OutputError
         If a file cannot be written.
     """
-    if path.suffix != ".pvd":
-        raise InputError(f"a VTK series is written to a .pvd file, found {path.name!r}")
+    check_vtk_series(path, overwrite=True)
     try:
         from vtkmodules.util import numpy_support
         from vtkmodules.vtkCommonCore import vtkPoints
@@ -190,6 +209,8 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
     folder = path.with_suffix("")
     try:
         folder.mkdir(exist_ok=True)
+        for former in folder.glob(f"{escape(folder.name)}-[0-9][0-9][0-9][0-9][0-9].vtp"):
+            former.unlink()
     except OSError as error:
         raise OutputError(f"cannot write {folder}: {error.strerror}") from None
     entries = []

@@ -12,6 +12,7 @@ holds to round-off over any number of frames.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.steady import per_particle
-from etc_engine.errors import InputError
+from etc_engine.errors import EtcError, InputError
 from etc_engine.packing.particles import ParticlePacking, particle_values
 from etc_engine.packing.trajectory import Trajectory
 from etc_engine.solvers.marching import march
@@ -110,6 +111,26 @@ class MovingState:
         return self.stored - float(self.heat.sum())
 
 
+@contextmanager
+def named_frame(trajectory: Trajectory, frame: int) -> Iterator[None]:
+    """Errors of the engine in the block begin with the frame and its time.
+
+    Examples
+    --------
+    >>> from etc_engine import Box
+    >>> still = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0)))
+    >>> with named_frame(Trajectory([0.0, 2.0], [still, still]), 1):
+    ...     raise InputError("the wall is bare")
+    Traceback (most recent call last):
+    etc_engine.errors.InputError: frame 1 (t = 2 s): the wall is bare
+    """
+    try:
+        yield
+    except EtcError as error:  # the same error, with whatever else it holds
+        error.args = (f"frame {frame} (t = {trajectory.times[frame]:g} s): {error}", *error.args[1:])
+        raise
+
+
 def march_trajectory(
     trajectory: Trajectory,
     contacts: Callable[[ParticlePacking], ContactNetwork],
@@ -159,6 +180,7 @@ def march_trajectory(
     Raises
     ------
     InputError, GeometryError, ConvergenceError
+        The message begins with the frame.
 
     Notes
     -----
@@ -186,43 +208,48 @@ def march_trajectory(
     first = trajectory.packings[0]
     capacities = first.measures * per_particle(heat_capacity, first.count, "heat capacity")
     start = particle_values(initial, first.count, "initial temperature")
-    packing, network = _contacts(first, expansion, start, contacts)
-    system = build(network, capacities)
+
+    def made(frame: int, temperatures: NDArray[np.float64]) -> tuple[ContactNetwork, ParticleSystem]:
+        with named_frame(trajectory, frame):
+            packing = trajectory.packings[frame]
+            network = contacts(packing if expansion is None else expansion.apply(packing, temperatures))
+            return network, build(network, capacities)
+
+    network, system = made(0, start)
     rates = system.heat.rates(trajectory.times[0], system.initial(start))
     none = np.zeros_like(rates)
     state = MovingState(
-        0, float(trajectory.times[0]), start, packing.radii, rates, none, 0.0, network.count, 0, 0, 0, 0
+        0, float(trajectory.times[0]), start, network.packing.radii, rates, none, 0.0, network.count, 0, 0, 0, 0
     )
     if restart is None:
         yield state
     else:
         state = restart
-        packing, network = _contacts(trajectory.packings[state.frame], expansion, state.temperatures, contacts)
-        system = build(network, capacities)
+        network, system = made(state.frame, state.temperatures)
     for frame, (low, high) in enumerate(pairwise(trajectory.times)):
         if frame < state.frame:
             continue
-        *_, ended = march(
-            system.heat,
-            system.initial(state.temperatures),
-            [low, high],
-            scheme=scheme,
-            steps=None if scheme == "adaptive" else steps,
-            tolerance=tolerance,
-            solver_tolerance=solver_tolerance,
-            progress=progress,
-        )
+        with named_frame(trajectory, frame):
+            *_, ended = march(
+                system.heat,
+                system.initial(state.temperatures),
+                [low, high],
+                scheme=scheme,
+                steps=None if scheme == "adaptive" else steps,
+                tolerance=tolerance,
+                solver_tolerance=solver_tolerance,
+                progress=progress,
+            )
         temperatures = system.particle_temperatures(ended.temperatures)
         rates = system.heat.rates(high, ended.temperatures)
         before = network
-        packing, network = _contacts(trajectory.packings[frame + 1], expansion, temperatures, contacts)
-        system = build(network, capacities)
+        network, system = made(frame + 1, temperatures)
         opened, closed = _changes(before, network)
         state = MovingState(
             frame + 1,
             float(high),
             temperatures,
-            packing.radii,
+            network.packing.radii,
             rates,
             state.heat + ended.heat,
             float(capacities @ (temperatures - start)),
@@ -233,16 +260,6 @@ def march_trajectory(
             state.iterations + ended.iterations,
         )
         yield state
-
-
-def _contacts(
-    packing: ParticlePacking,
-    expansion: ThermalExpansion | None,
-    temperatures: NDArray[np.float64],
-    contacts: Callable[[ParticlePacking], ContactNetwork],
-) -> tuple[ParticlePacking, ContactNetwork]:
-    packing = packing if expansion is None else expansion.apply(packing, temperatures)
-    return packing, contacts(packing)
 
 
 def _changes(before: ContactNetwork, after: ContactNetwork) -> tuple[int, int]:

@@ -19,9 +19,9 @@ from etc_engine.packing.dumps import read_trajectory
 from etc_engine.packing.formats import format_to_read, read_particles
 from etc_engine.packing.trajectory import Trajectory
 from etc_engine.solvers.marching import MarchState, march
-from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory
+from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
 from etc_engine.transient.states import State, claimed_states, write_state
-from etc_engine.transient.study import Gradient, NetworkStudy, plain
+from etc_engine.transient.study import Gradient, NetworkStudy, plain, refuse_endless
 from etc_engine.transient.systems import SYSTEMS, ParticleSystem, Physics, storing_area
 from etc_engine.walls import value_at
 
@@ -161,6 +161,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         raise StudyError(f"particles: there is no file {path}")
     trajectory = read_trajectory(path, motion.timestep)
     first = trajectory.packings[0]
+    if trajectory.times.size < 2:
+        raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
     if first.dimension != 2 or first.box.periodic != parse_periodic(study.periodic or first.box.periodic_axes, 2):
         raise StudyError(f"particles: disks in a box that is periodic along {study.periodic!r} are wanted: {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
@@ -188,8 +190,10 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
             progress=_fraction(progress, trajectory.times[0], trajectory.times[-1]),
         )
 
-    network = contacts(first)
-    system = SYSTEMS[method](network, physics)
+    refuse_endless(time, trajectory.times)
+    with named_frame(trajectory, 0):
+        network = contacts(first)
+        system = SYSTEMS[method](network, physics)
     return _Course(network, system, trajectory.times, marched, MovingState, trajectory)
 
 

@@ -4,31 +4,46 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from numpy.typing import NDArray
+from pydantic import Field, Tag, ValidationError, model_validator
 
 from etc_engine.batch.study_tables import ContactsTable, PackingTable
 from etc_engine.errors import InputError, StudyError
+from etc_engine.schema import (
+    AS_LIST,
+    AS_NUMBER,
+    AS_TABLE,
+    MOST_STEPS,
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    WRITTEN,
+    Flag,
+    NotNegative,
+    Number,
+    Positive,
+    Steps,
+    StudyTable,
+    Times,
+    Word,
+    first_problem,
+)
 from etc_engine.solvers.marching import SCHEMES
 from etc_engine.transient.systems import SYSTEMS
 from etc_engine.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable, WallCondition
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+A_VALUE = f"{NUMBER}, or a table {{ times = [...], values = [...] }}"
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class History(_Table):
+class History(StudyTable):
     """Values at increasing times, linear in between and constant outside."""
 
-    times: list[Finite]
-    values: list[Finite]
+    times: Times = Field(description=f"a list of times [s], each {NUMBER}")
+    values: list[Number] = Field(description=f"a list of values, each {NUMBER}")
 
     @model_validator(mode="after")
     def _check(self) -> History:
@@ -43,7 +58,7 @@ class History(_Table):
         return TimeTable(tuple(self.times), tuple(self.values))
 
 
-Value = Finite | History
+Value = Annotated[Annotated[Number, Tag(AS_NUMBER)] | Annotated[History, Tag(AS_TABLE)], WRITTEN]
 
 
 def plain(value: float | History) -> float | TimeTable:
@@ -51,21 +66,30 @@ def plain(value: float | History) -> float | TimeTable:
     return value.table() if isinstance(value, History) else value
 
 
-class Wall(_Table):
+class Wall(StudyTable):
     """One wall of ``[walls]``: how it exchanges heat."""
 
-    type: Literal["fixed", "flux", "convective", "insulated"]
-    value: Value | None = Field(
-        default=None, description="temperature [K], heat flux into the body [W/m2] or ambient temperature [K]"
+    type: Literal["fixed", "flux", "convective", "insulated"] = Field(
+        description="fixed, flux, convective or insulated"
     )
-    coefficient: Positive | None = Field(default=None, description="heat transfer coefficient [W/(m2 K)]")
+    value: Value | None = Field(
+        default=None,
+        description=f"{A_VALUE}: temperature [K], heat flux into the body [W/m2] or ambient temperature [K]",
+    )
+    coefficient: Positive | None = Field(
+        default=None, description=f"{POSITIVE}, the heat transfer coefficient [W/(m2 K)]"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Wall:
-        if (self.type == "convective") != (self.coefficient is not None):
-            raise ValueError("a coefficient goes with type = 'convective', and only with it")
-        if (self.type == "insulated") != (self.value is None):
-            raise ValueError("a value goes with every type but 'insulated'")
+        if self.type == "convective" and self.coefficient is None:
+            raise ValueError("coefficient: missing, type = 'convective' needs one [W/(m2 K)]")
+        if self.type != "convective" and self.coefficient is not None:
+            raise ValueError(f"coefficient: has no meaning with type = {self.type!r}, take it out")
+        if self.type != "insulated" and self.value is None:
+            raise ValueError(f"value: missing, type = {self.type!r} needs one")
+        if self.type == "insulated" and self.value is not None:
+            raise ValueError("value: has no meaning with type = 'insulated', take it out")
         return self
 
     def condition(self) -> WallCondition:
@@ -80,13 +104,16 @@ class Wall(_Table):
         return Convective(self.coefficient, plain(self.value))
 
 
-class WallsTable(_Table):
+A_WALL = "a table such as { type = 'fixed', value = 1.0 }"
+
+
+class WallsTable(StudyTable):
     """``[walls]``; a wall that is left out is insulated."""
 
-    left: Wall | None = None
-    right: Wall | None = None
-    bottom: Wall | None = None
-    top: Wall | None = None
+    left: Wall | None = Field(default=None, description=A_WALL)
+    right: Wall | None = Field(default=None, description=A_WALL)
+    bottom: Wall | None = Field(default=None, description=A_WALL)
+    top: Wall | None = Field(default=None, description=A_WALL)
 
     def conditions(self) -> dict[str, WallCondition]:
         """The conditions by wall."""
@@ -94,14 +121,16 @@ class WallsTable(_Table):
         return {name: wall.condition() for name, wall in given.items() if wall is not None}
 
 
-class Conduction(_Table):
+class Conduction(StudyTable):
     """``[conduction]``: the method and the contacts' material."""
 
-    method: str = "pipe"
-    pipe_resistance: Literal["chord", "uniform"] | None = None
-    dipoles: bool = False
-    conductivity: Positive | None = Field(default=None, description="of the particles [W/(m K)]; 1 by default")
-    contact_resistance: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] = 0.0
+    method: Word = Field(default="pipe", description=", ".join(SYSTEMS))
+    pipe_resistance: Literal["chord", "uniform"] | None = Field(default=None, description="chord or uniform")
+    dipoles: Flag = Field(default=False, description="true or false")
+    conductivity: Positive | None = Field(
+        default=None, description=f"{POSITIVE}, of the particles [W/(m K)]; 1 by default"
+    )
+    contact_resistance: NotNegative = Field(default=0.0, description=f"{NOT_NEGATIVE} [m K/W]")
 
     @model_validator(mode="after")
     def _check(self) -> Conduction:
@@ -114,76 +143,115 @@ class Conduction(_Table):
         return self
 
 
-class Gradient(_Table):
+class Gradient(StudyTable):
     """A temperature that varies linearly: ``value`` at the origin, ``gradient`` [K/m]."""
 
-    value: Finite
-    gradient: tuple[Finite, Finite]
+    value: Number = Field(description=f"{NUMBER} [K]")
+    gradient: tuple[Number, Number] = Field(description=f"two numbers [K/m], each {NUMBER}")
 
 
-class Source(_Table):
+class Source(StudyTable):
     """One of ``[[source]]``: heat set free in each of some particles (all by default) [W/m]."""
 
-    heat: Value
-    particles: list[Annotated[int, Field(ge=0)]] | None = None
+    heat: Value = Field(description=f"{A_VALUE} [W/m]")
+    particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
+        default=None, description="a list of whole numbers from 0, the rows of particles; all by default"
+    )
 
 
-class Material(_Table):
+class Material(StudyTable):
     """``[material]``: storage and initial temperatures; a number, or one for each particle."""
 
-    heat_capacity: Positive | list[Positive] = Field(description="rho c [J/(m3 K)]")
-    initial: Finite | list[Finite] | Gradient = Field(description="[K]")
+    heat_capacity: Annotated[
+        Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], Field(min_length=1), Tag(AS_LIST)], WRITTEN
+    ] = Field(description=f"{POSITIVE}, or a list of such, one for each particle: rho c [J/(m3 K)]")
+    initial: Annotated[
+        Annotated[Number, Tag(AS_NUMBER)]
+        | Annotated[list[Number], Field(min_length=1), Tag(AS_LIST)]
+        | Annotated[Gradient, Tag(AS_TABLE)],
+        WRITTEN,
+    ] = Field(
+        description=f"{NUMBER} [K], a list of such, one for each particle, or a table such as "
+        "{ value = 0.0, gradient = [1.0, 0.0] }"
+    )
 
 
-class Time(_Table):
+class Time(StudyTable):
     """``[time]``: scheme, steps and output times; times[0] is the start."""
 
-    scheme: str = "bdf2"
-    times: list[Finite] = Field(default=[], description="of the output; with [motion] those of the frames")
-    step: Positive | None = None
-    steps: Annotated[int, Field(ge=1)] | None = Field(default=None, description="of each output interval")
-    tolerance: Positive = Field(default=1e-3, description="of an adaptive step [K]")
+    scheme: Word = Field(default="bdf2", description=", ".join(SCHEMES))
+    times: Times = Field(default=[], description=f"a list of output times [s], the first one the start, each {NUMBER}")
+    step: Positive | None = Field(default=None, description=f"{POSITIVE} [s]")
+    steps: Steps | None = Field(
+        default=None, description="a whole number of at least 1, of each output interval or from frame to frame"
+    )
+    tolerance: Positive = Field(default=1e-3, description=f"{POSITIVE}, of an adaptive step [K]")
 
     @model_validator(mode="after")
     def _check(self) -> Time:
         if self.scheme not in SCHEMES:
             raise ValueError(f"scheme: found {self.scheme!r}, allowed: {', '.join(SCHEMES)}")
-        if len(self.times) == 1 or any(np.diff(self.times) <= 0.0):
-            raise ValueError("times: they must increase; the first one is the start")
+        if len(self.times) == 1:
+            raise ValueError("times: at least two are needed; the first one is the start")
         if self.scheme == "adaptive" and self.steps is not None:
             raise ValueError("steps: an adaptive scheme chooses them; give a tolerance")
-        if self.scheme != "adaptive" and (self.step is None) == (self.steps is None):
+        if self.scheme != "adaptive" and "tolerance" in self.model_fields_set:
+            raise ValueError(f"tolerance: has no meaning with scheme = {self.scheme!r}, only with 'adaptive'")
+        if self.step is not None and self.steps is not None:
+            raise ValueError("give step, in seconds, or steps, of each output interval, not both")
+        if self.scheme != "adaptive" and self.step is None and self.steps is None:
             raise ValueError(f"scheme {self.scheme!r} needs either step, in seconds, or steps, of each output interval")
         return self
 
 
-class Motion(_Table):
+def refuse_endless(time: Time, times: Sequence[float] | NDArray[np.float64]) -> None:
+    """Refuse steps that no run lives to see.
+
+    Raises
+    ------
+    StudyError
+        If output at these times asks for more than `MOST_STEPS`.
+    """
+    intervals = np.diff(np.asarray(times, dtype=np.float64))
+    if time.scheme == "adaptive":
+        return
+    count = float(intervals.size) * float(time.steps) if time.steps else float((intervals / (time.step or 1.0)).sum())
+    if count > MOST_STEPS:
+        word = "steps" if time.steps else "step"
+        raise StudyError(f"time.{word}: that makes {count:.3g} steps in total, allowed are {MOST_STEPS:.0e}")
+
+
+class Motion(StudyTable):
     """``[motion]``: all frames of the dump, one after the other, instead of one."""
 
-    timestep: Positive = Field(description="time of one step of the dump [s]")
-    expansion: Finite = Field(default=0.0, description="linear thermal expansion of the radii [1/K]")
-    reference: Finite = Field(default=0.0, description="temperature of the radii in the dump [K]")
+    timestep: Positive = Field(description=f"{POSITIVE}, the time of one step of the dump [s]")
+    expansion: Number = Field(default=0.0, description=f"{NUMBER}, linear thermal expansion of the radii [1/K]")
+    reference: Number = Field(default=0.0, description=f"{NUMBER}, temperature of the radii in the dump [K]")
 
 
-class NetworkStudy(_Table):
+class NetworkStudy(StudyTable):
     """A transient study of kind "network"."""
 
-    schema_version: Literal[1] = Field(alias="schema")
-    kind: Literal["network"]
-    name: str
-    seed: Annotated[int, Field(ge=0, lt=2**63)] | None = None
-    particles: str | None = Field(default=None, description="a particle file, relative to the study file")
-    frame: int | None = None
-    box: tuple[Positive, Positive] | None = Field(default=None, description="of a CSV file")
-    periodic: str | None = None
+    schema_version: Literal[1] = Field(alias="schema", description="1")
+    kind: Literal["network"] = Field(description="network")
+    name: Word = Field(description="a name")
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
+        default=None, description="a whole number from 0 to 2**63 - 1, with [packing]"
+    )
+    particles: Word | None = Field(default=None, description="a particle file, relative to the study file")
+    frame: Annotated[int, Field(strict=True)] | None = Field(
+        default=None, description="the number of a frame of a dump, from 0; the last one by default"
+    )
+    box: tuple[Positive, Positive] | None = Field(default=None, description="two positive edge lengths, of a CSV file")
+    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, of a CSV file")
     packing: PackingTable | None = None
     contacts: ContactsTable = ContactsTable()
     conduction: Conduction = Conduction()
-    material: Material
+    material: Material = Field(description="a table with heat_capacity and initial")
     walls: WallsTable = WallsTable()
-    source: list[Source] = []
-    motion: Motion | None = None
-    time: Time
+    source: list[Source] = Field(default=[], description="tables [[source]] with heat and particles")
+    motion: Motion | None = Field(default=None, description="a table with timestep")
+    time: Time = Field(description="a table with times and steps")
 
     @model_validator(mode="after")
     def _check(self) -> NetworkStudy:
@@ -200,6 +268,10 @@ class NetworkStudy(_Table):
             raise ValueError("time.times: missing, expected the output times; the first one is the start")
         if self.motion is not None:
             self._check_motion(self.motion)
+        try:
+            refuse_endless(self.time, self.time.times)
+        except StudyError as error:
+            raise ValueError(str(error)) from None
         if len(self.contacts.contact_angle or (0.0,)) != 1:
             raise ValueError("contacts.contact_angle: a transient has one half-angle")
         return self
@@ -223,10 +295,13 @@ class NetworkStudy(_Table):
         """The study with all defaults written out, as plain JSON values."""
         return self.model_dump(mode="json", by_alias=True)
 
+    def identity(self) -> dict[str, Any]:
+        """What decides the numbers: everything but the name."""
+        return {key: value for key, value in self.resolved().items() if key != "name"}
+
     def digest(self) -> str:
-        """SHA-256 of all that decides the numbers: everything but the name."""
-        identity = {key: value for key, value in self.resolved().items() if key != "name"}
-        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+        """SHA-256 of the identity."""
+        return hashlib.sha256(json.dumps(self.identity(), sort_keys=True).encode()).hexdigest()
 
 
 def parse_study(content: Mapping[str, Any]) -> NetworkStudy:
@@ -241,14 +316,9 @@ def parse_study(content: Mapping[str, Any]) -> NetworkStudy:
     --------
     >>> parse_study({"schema": 1, "kind": "network", "name": "bed"})
     Traceback (most recent call last):
-    etc_engine.errors.StudyError: material: Field required (and 1 more)
+    etc_engine.errors.StudyError: material: missing, expected a table ... (and 1 more problem)
     """
     try:
         return NetworkStudy.model_validate(dict(content))
     except ValidationError as error:
-        # where a number or a table may stand, our own check of the table says more than "not a number"
-        details = sorted(error.errors(), key=lambda detail: detail["type"] != "value_error")
-        first, count = details[0], len(details)
-        place = ".".join(str(part) for part in first["loc"]) or "the study"
-        more = f" (and {count - 1} more)" if count > 1 else ""
-        raise StudyError(f"{place}: {first['msg'].removeprefix('Value error, ')}{more}") from error
+        raise StudyError(first_problem(error, NetworkStudy)) from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,9 @@ SOLVERS = ("cg", "eyre-milton")
 BOUNDARIES = ("periodic", "walls")
 NOTHING = 1e-14
 """A conductivity below this part of the largest counts as 0."""
+
+CUT_OFF = 1e-8
+"""Beside insulators, an effective conductivity below this part of the largest of a voxel is the rounding of 0."""
 
 SINGULAR = 1e-11
 """Part of the largest resistivity below which perfect conductors are said to join across the cell."""
@@ -101,7 +104,8 @@ def solve_cell(
     With perfect conductors the resistivities are solved for fluxes, which is the same discrete problem seen from its
     other side. `tolerance` bounds the change of the polarization with Eyre-Milton, to which the error of the
     conductivity is proportional; conjugate gradients estimate that error itself, which is the square of the
-    residual's, and need about half the iterations for it.
+    residual's, and need about half the iterations for it. Where voxels insulate, what is below 1e-8 of the largest
+    conductivity is rounding, and answered as 0 with no error.
 
     Examples
     --------
@@ -112,7 +116,8 @@ def solve_cell(
     """
     image = voxel_conductivity(conductivity)
     d = len(image.shape)
-    _check(image, lengths, boundary, solver, tolerance, threads)
+    _check_numbers(d, lengths, tolerance, threads, limit, axes)
+    _check(image, boundary, solver)
     spacing = tuple(length / count for length, count in zip(lengths, image.shape, strict=True))
     perfect = bool(np.isinf(image.extremes()[1]))
     wanted = tuple(range(d)) if axes is None else axes
@@ -129,6 +134,7 @@ def solve_cell(
             part, found = _solve_loads(
                 image, projection.onto_gradients, group, solver, tolerance, limit, keep_gradients
             )
+            _cut_off(part, found, group, image)
         known = np.ix_(group, group)
         tensor[known] = part[known]
         loads += found
@@ -140,21 +146,30 @@ def solve_cell(
     return CellSolution(tensor, max(load.iterations for load in loads), max(load.error for load in loads), kept)
 
 
-def _check(
-    image: VoxelConductivity, lengths: Sequence[float], boundary: str, solver: str, tolerance: float, threads: int
+def _check_numbers(
+    d: int, lengths: Sequence[float], tolerance: float, threads: int, limit: int, axes: tuple[int, ...] | None
 ) -> None:
+    numbers = all(isinstance(x, (int, float, np.number)) and np.isfinite(float(x)) and x > 0.0 for x in lengths)
+    if len(lengths) != d or not numbers:
+        raise InputError(f"an image of {d} axes needs as many positive edge lengths, found {tuple(lengths)}")
+    if not isinstance(tolerance, (int, float, np.number)) or not 0.0 < tolerance < 1.0:
+        raise InputError(f"the tolerance must lie between 0 and 1, found {tolerance!r}")
+    if not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise InputError(f"the FFT needs at least one thread, found {threads!r}")
+    if not isinstance(limit, (int, np.integer)) or limit < 1:
+        raise InputError(f"a load needs at least one iteration, found {limit!r}")
+    known = axes is None or (isinstance(axes, Sequence) and len(axes) > 0 and set(axes) <= set(range(d)))
+    if not known or (axes is not None and len(set(axes)) < len(axes)):
+        raise InputError(
+            f"the load axes of an image of {d} axes are different numbers from 0 to {d - 1}, found {axes!r}"
+        )
+
+
+def _check(image: VoxelConductivity, boundary: str, solver: str) -> None:
     if boundary not in BOUNDARIES:
         raise InputError(f"unknown boundary {boundary!r}: choose {' or '.join(BOUNDARIES)}")
     if solver not in SOLVERS:
         raise InputError(f"unknown solver {solver!r}: choose {' or '.join(SOLVERS)}")
-    if len(lengths) != len(image.shape) or not all(np.isfinite(x) and x > 0.0 for x in lengths):
-        raise InputError(
-            f"an image of {len(image.shape)} axes needs as many positive edge lengths, found {tuple(lengths)}"
-        )
-    if not 0.0 < tolerance < 1.0:
-        raise InputError(f"the tolerance must lie between 0 and 1, found {tolerance:g}")
-    if threads < 1:
-        raise InputError(f"the FFT needs at least one thread, found {threads}")
     if min(image.shape) < 2:
         raise InputError(f"an image needs at least 2 voxels along each axis, found {image.shape}")
     least, largest = image.extremes()
@@ -206,6 +221,19 @@ def _solve_loads(
         fluctuation = load.fluctuation if keep else np.zeros(0)
         loads.append(LoadSolution(load.flux, fluctuation, None, load.iterations, load.error))
     return tensor, loads
+
+
+def _cut_off(
+    tensor: NDArray[np.float64], loads: list[LoadSolution], axes: tuple[int, ...], image: VoxelConductivity
+) -> None:
+    """Make 0 what insulators leave of the conductivity along an axis that nothing conducts along."""
+    least, largest = image.extremes()
+    if least > NOTHING * largest:
+        return
+    for number, axis in enumerate(axes):
+        if tensor[axis, axis] <= CUT_OFF * largest:
+            tensor[axis, list(axes)] = tensor[list(axes), axis] = 0.0
+            loads[number] = replace(loads[number], error=0.0)
 
 
 def _solve_fluxes(

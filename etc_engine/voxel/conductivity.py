@@ -94,7 +94,10 @@ def voxel_conductivity(values: ArrayLike | VoxelConductivity) -> VoxelConductivi
     """
     if isinstance(values, VoxelConductivity):
         return values
-    values = np.ascontiguousarray(values, dtype=np.float64)
+    try:
+        values = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("the conductivities of voxels must be numbers in an array of equal rows") from None
     if np.isnan(values).any():
         raise InputError("the conductivity of a voxel must be a number, found NaN")
     d = values.ndim - 2

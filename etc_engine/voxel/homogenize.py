@@ -106,7 +106,9 @@ def homogenize_voxel(
 
     fine, fraction, unknowns = solve(resolution, green)
     error = np.nan
-    if estimate_error:
+    if estimate_error and not np.diag(fine.tensor).any():
+        error = 0.0  # nothing conducts
+    elif estimate_error:
         half, quarter = (resolution + 1) // 2, (resolution + 3) // 4
         middle = solve(half, green)[0]
         differences = [2.0 * _difference(fine, middle)]
@@ -123,7 +125,7 @@ def homogenize_voxel(
 
 
 def _difference(one: CellSolution, other: CellSolution) -> float:
-    """Largest difference along an axis, relative to the first."""
+    """Largest difference along an axis, relative to the first; none along axes that do not conduct."""
     first, second = np.diag(one.tensor), np.diag(other.tensor)
-    scale = np.where(first > 0.0, first, np.maximum(second, np.finfo(float).tiny))
-    return float((np.abs(first - second) / scale).max())
+    conducts = first > 0.0
+    return float((np.abs(first - second)[conducts] / first[conducts]).max(initial=0.0))

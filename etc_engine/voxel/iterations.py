@@ -18,6 +18,9 @@ Projection = Callable[[Field], Field]
 DELAY = 4
 """Steps of conjugate gradients whose decrease of the energy estimates the error left before them."""
 
+LARGE = 1e6
+"""A contrast from here on is too large where conjugate gradients do not come to an end."""
+
 VANISHING = 1e-13
 """A conductivity below this part of the mean of the phases counts as 0."""
 
@@ -161,7 +164,7 @@ def solve_conjugate_gradients(
         if len(gains) == limit:
             raise ConvergenceError(
                 f"conjugate gradients: the conductivity still fell by {gains[-1] / energy:.2g} of itself in the last "
-                f"of {limit} iterations (wanted {tolerance:g}): allow more, or use the rotated Green operator",
+                f"of {limit} iterations (wanted {tolerance:g}){_advice(conductivity)}",
                 [gain / voigt for gain in gains],
             )
         image = project(conductivity.apply(direction))
@@ -178,6 +181,17 @@ def solve_conjugate_gradients(
     flux = conductivity.apply(uniform).reshape(d, cells).mean(axis=1)
     error = gains[-1] / energy if gains and energy > VANISHING * voigt else 0.0
     return LoadSolution(flux, fluctuation, residual, len(gains), error)
+
+
+def _advice(conductivity: VoxelConductivity) -> str:
+    """What helps against slow conjugate gradients."""
+    least, largest = conductivity.extremes()
+    if least > 0.0 and largest >= LARGE * least:
+        return (
+            f": the contrast {largest / least:.3g} is too large for the iteration: give inf (or 0) for what conducts "
+            "so much better (or worse)"
+        )
+    return ": allow more, or use the rotated Green operator if another one is in use"
 
 
 @njit(cache=True)

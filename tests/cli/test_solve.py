@@ -139,3 +139,25 @@ def test_impossible_geometries_are_refused(etc_engine, disks):
 )
 def test_bad_options_are_refused(etc_engine, options, words):
     assert words in refused(etc_engine("solve", TABLE_2, "--box", "1,1", *options))
+
+
+@pytest.mark.parametrize(
+    ("rows", "options", "words"),
+    [
+        ("0.5,0.5,1e308", ["--box", "1,1"], "has a radius beyond 1e+06 times the box"),
+        ("0.5,0.5,0.1", ["--box", "1e200,1"], "must lie between 1e-100 and 1e100"),
+        (
+            "0.5,0.5,0.5",
+            ["--box", "1,1", "--conductivity", "1e308"],
+            "the conductivity must lie between 1e-100 and",
+        ),
+        ("0.5,0.5,0.5", ["--box", "1,1", "--conductivity", "1e-300"], "the conductivity must lie between"),
+        ("0.5,0.5,0.5", ["--box", "1,1", "--contact-resistance", "1e200"], "the contact resistance must lie between"),
+    ],
+)
+def test_numbers_beyond_all_measure_are_refused(etc_engine, tmp_path, rows, options, words):
+    (tmp_path / "disks.csv").write_text(f"x,y,radius\n{rows}\n")
+    done = etc_engine("solve", tmp_path / "disks.csv", *options)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == 1

@@ -114,6 +114,16 @@ def test_an_existing_output_is_kept_without_overwrite(tmp_path):
         ("steps = 24", "stepps = 24", "solver.stepps"),
         ("conductivity = 1.25", "conductivity = -1.0", "body.conductivity"),
         ("initial = 30.0", "initial = [", "not a TOML file"),
+        ("heat_capacity = 1.0", "heat_capacity = 1e300", "body.heat_capacity: found 1e+300, allowed: a positive"),
+        ("heat_capacity = 1.0", "heat_capcity = 1.0", "body.heat_capcity: unknown key, did you mean 'heat_capacity'?"),
+        ("times = [0.6, 1.2]", "times = [1e-320]", "times: the first is 0 or at least 1e-100 s"),
+        ("times = [0.6, 1.2]", "times = [0.6, '1']", "output.times[1]: found '1', allowed: a list of times"),
+        ("steps = 24", "steps = 1_000_000_000_000", "solver.steps: found 1000000000000, allowed"),
+        (
+            "value = 0.0",
+            "value = {times = [0.0, 1.0]}",
+            "boundary[0].value.values: missing, expected at least two values",
+        ),
         ('type = "dirichlet"\nvalue = 0.0', 'type = "convective"\nvalue = 0.0', "coefficient"),
         ("points = [[1.5, 1.5], [2.4, 2.4]]", "points = []", "points or a grid"),
         ("points = [[1.5, 1.5], [2.4, 2.4]]", "points = [[5, 5]]", "outside the body"),
@@ -136,3 +146,11 @@ def test_a_missing_study_and_a_missing_folder(tmp_path):
     command = [str(tmp_path / "study.toml"), "-o", str(tmp_path / "none" / "out.nc")]
     result = CliRunner().invoke(transient_command, command, standalone_mode=False)
     assert isinstance(result.exception, OutputError)
+
+
+def test_the_study_itself_is_no_output(tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(STUDY)
+    result = CliRunner().invoke(transient_command, [str(study), "-o", str(study), "--overwrite"], standalone_mode=False)
+    assert isinstance(result.exception, OutputError) and "the input itself" in str(result.exception)
+    assert study.read_text() == STUDY

@@ -94,7 +94,9 @@ def test_it_goes_on_from_its_last_state_with_the_same_bits(etc_engine, bed, monk
         ("steps = 2", "step = 0.01", "give the steps from frame to frame"),
         ("steps = 2", "steps = 2\ntimes = [0.0, 1.0]", "the output times are those of the frames"),
         ("timestep = 0.001", "timestep = 0.0", "motion.timestep"),
-        ("timestep = 0.001", "", "motion.timestep: Field required"),
+        ("timestep = 0.001", "timestep = 1e300", "motion.timestep: found 1e+300, allowed: a positive number"),
+        ("timestep = 0.001", "timestep = 1e-320", "motion.timestep: found 1e-320, allowed: a positive number"),
+        ("timestep = 0.001", "", "motion.timestep: missing, expected a positive number"),
         ("timestep = 0.001", "timestep = 0.001\nexpansion = -3.0", "no radius"),
         ("[motion]\ntimestep = 0.001", "", "time.times: missing"),
     ],
@@ -106,3 +108,48 @@ def test_what_is_refused(etc_engine, bed, old, new, words):
     assert done.returncode == 2
     assert words in done.stderr
     assert not (bed / "out.nc").exists()
+
+
+def change(path, frame, edit):
+    """Rewrite one frame of a dump."""
+    parts = path.read_text().split("ITEM: TIMESTEP\n")
+    parts[frame + 1] = edit(parts[frame + 1])
+    path.write_text("ITEM: TIMESTEP\n".join(parts))
+
+
+def lifted(text):
+    """The particles of a frame raised from the bottom wall."""
+    head, names, rows = text.partition("ITEM: ATOMS id type x y z radius\n")
+    table = [line.split() for line in rows.splitlines()]
+    raised = [" ".join([*row[:3], repr(0.03 + 0.95 * float(row[3])), *row[4:]]) for row in table]
+    return head + names + "\n".join(raised) + "\n"
+
+
+def test_a_bare_flux_wall_names_its_frame_and_keeps_the_states(etc_engine, bed):
+    study = bed / "study.toml"
+    study.write_text(STUDY.replace('bottom = { type = "fixed"', 'bottom = { type = "flux"'))
+    change(bed / "bed.dump", 6, lifted)
+    done = etc_engine("transient", study, "-o", bed / "out.nc")
+    assert done.returncode == 2
+    assert "frame 6 (t = 0.06 s): no particle touches the bottom wall" in done.stderr
+    assert len(list((bed / "out.nc.states").glob("*.npz"))) == 6
+    change(bed / "bed.dump", 0, lifted)
+    done = etc_engine("transient", study, "-o", bed / "new.nc")
+    assert "frame 0 (t = 0 s): no particle touches the bottom wall" in done.stderr
+    assert not (bed / "new.nc.states").exists()
+
+
+def test_steps_of_all_frames_are_counted(etc_engine, bed):
+    (bed / "study.toml").write_text(STUDY.replace("steps = 2", "steps = 500_000_000"))
+    done = etc_engine("transient", bed / "study.toml", "-o", bed / "out.nc")
+    assert "4e+09 steps in total" in done.stderr
+
+
+def test_one_frame_and_a_cut_number_are_refused(etc_engine, bed):
+    text = (bed / "bed.dump").read_text()
+    (bed / "bed.dump").write_text(text[:-3])  # the last radius has lost its last digits, and would be read
+    done = etc_engine("transient", bed / "study.toml", "-o", bed / "out.nc")
+    assert "frame 8 is cut short" in done.stderr
+    (bed / "bed.dump").write_text(text[: text.index("ITEM: TIMESTEP", 1)])
+    done = etc_engine("transient", bed / "study.toml", "-o", bed / "out.nc")
+    assert "holds one frame, so there is nothing to march" in done.stderr

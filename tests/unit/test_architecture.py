@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2] / "etc_engine"
-LEAVES = {"errors", "box", "walls", "solvers", "models"}
+LEAVES = {"errors", "box", "walls", "schema", "solvers", "models"}
 ORDER = (
     ("packing",),
     ("contacts", "composite"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import pytest
@@ -77,6 +78,11 @@ def test_without_density_the_packer_decides():
             ("conduction.angle_curve", "found 'some'", "reduced or full"),
         ),
         ("[statistics]", "[conduction]\nmethod = 5\n[statistics]", ("conduction.method", "found 5")),
+        (
+            "[statistics]",
+            '[conduction]\npipe_resistance = "chord"\n[statistics]',
+            ("conduction.pipe_resistance: unknown key", "engine = 'pipe' has method = 'chord' or 'uniform'"),
+        ),
         ("[statistics]", '[conduction]\nengine = "fem"\n[statistics]', ("conduction.engine", "found 'fem'", "dtem")),
         ("realizations = 3", "realizations = 0", ("statistics.realizations", "found 0", "at least 1")),
         ("realizations = 3", "realizations = 2.5", ("statistics.realizations", "found 2.5")),
@@ -152,3 +158,15 @@ def test_no_text_gives_anything_but_a_study_or_one_line(noise, place):
         parse_study(text)
     except StudyError as error:
         assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("name", ["", "a\nb", "\x1b[31mred", "a\x00b", "n" * 81])
+def test_a_name_is_short_and_printable(name):
+    with pytest.raises(StudyError, match=r"name: found .* allowed: 1 to 80 printable characters"):
+        parse_study(STUDY.replace(STUDY[STUDY.index("name = ") :].splitlines()[0], f"name = {json.dumps(name)}"))
+
+
+@pytest.mark.parametrize("text", ["a = " + "9" * 6000, "a = " + "[" * 3000])
+def test_what_the_toml_reader_cannot_hold_is_refused(text):
+    with pytest.raises(StudyError, match="is not valid TOML"):
+        parse_study(text)

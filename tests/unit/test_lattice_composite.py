@@ -92,6 +92,20 @@ def test_random_spheres_conduct_as_by_fft(contrast, boundary):
     assert difference < lattice.relative_error_estimate + fft.relative_error_estimate
 
 
+@pytest.mark.parametrize("boundary", ["periodic", "walls"])
+@pytest.mark.parametrize("transmission", ["laguerre", "contact"])
+def test_perfect_conductors_that_join_across_the_cell_are_refused(boundary, transmission):
+    joined = spheres(CENTRE, 0.55, np.inf)
+    with pytest.raises(GeometryError, match=r"join across the cell along x .* give them a finite conductivity"):
+        homogenize_lattice(joined, rng=rng(), particles=800, boundary=boundary, transmission=transmission)
+
+
+def test_perfect_conductors_that_join_in_pairs_only_are_solved():
+    pair = spheres([[0.5, 0.5, 0.4], [0.5, 0.5, 0.6]], 0.2, np.inf)
+    made = homogenize_lattice(pair, rng=rng(), particles=1000, estimate_error=False)
+    assert 1.0 < made.tensor[0, 0] < made.tensor[2, 2] < 10.0
+
+
 def test_a_matrix_of_inclusions_is_homogeneous():
     made = homogenize_lattice(spheres(CENTRE, 0.3, 1.0), rng=rng(), particles=600, tolerance=1e-12)
     np.testing.assert_allclose(made.tensor, np.eye(3), atol=1e-9)

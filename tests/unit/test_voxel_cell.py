@@ -7,9 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from etc_engine.box import Box
+from etc_engine.composite import Composite
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.models.bounds import parallel, series
-from etc_engine.voxel import solve_cell
+from etc_engine.packing.particles import ParticlePacking
+from etc_engine.voxel import homogenize_voxel, solve_cell
 from etc_engine.voxel.cell import _solve_fluxes
 from etc_engine.voxel.conductivity import voxel_conductivity
 from etc_engine.voxel.green import GREEN_OPERATORS, gradient_projection
@@ -240,6 +243,17 @@ def test_tensors_of_voxels_are_taken_as_they_are():
         (np.ones((4, 4)), {"boundary": "open"}, "unknown boundary"),
         (np.ones((4, 4)), {"tolerance": 0.0}, "tolerance"),
         (np.ones((4, 4)), {"threads": 0}, "at least one thread"),
+        (np.ones((4, 4)), {"threads": 1.5}, "at least one thread"),
+        (np.ones((4, 4)), {"tolerance": "small"}, "tolerance"),
+        (np.ones((4, 4)), {"axes": (5,)}, "load axes of an image of 2 axes are different numbers below 2"),
+        (np.ones((4, 4)), {"axes": (0, 0)}, "axes of an image"),
+        (np.ones((4, 4)), {"axes": ()}, "axes of an image"),
+        (np.ones((4, 4)), {"axes": "xy"}, "axes of an image"),
+        (np.ones((4, 4)), {"axes": 0}, "axes of an image"),
+        (np.ones((4, 4)), {"limit": 0}, "at least one iteration, found 0"),
+        (np.ones((4, 4)), {"limit": "many"}, "at least one iteration"),
+        (np.full((4, 4), "k"), {}, "must be numbers"),
+        ([[1.0, 2.0], [1.0]], {}, "must be numbers"),
     ],
 )
 def test_bad_input_is_refused(image, options, words):
@@ -250,6 +264,8 @@ def test_bad_input_is_refused(image, options, words):
 def test_lengths_must_fit_and_joined_perfect_conductors_are_refused():
     with pytest.raises(InputError, match="positive edge lengths"):
         solve_cell(np.ones((4, 4)), (1.0,))
+    with pytest.raises(InputError, match="positive edge lengths"):
+        solve_cell(np.ones((4, 4)), ("1", "b"))
     bars = np.ones((4, 4))
     bars[:, 1] = np.inf
     with pytest.raises(InputError, match="join across the cell along x"):
@@ -262,9 +278,30 @@ def test_what_does_not_conduct_across_answers_zero():
     assert solve_cell(bars, (1.0, 1.0)).tensor == pytest.approx(np.diag([0.75, 0.0]), abs=1e-12)
 
 
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize(("radius", "matrix", "inclusion"), [(0.55, 1.0, 0.0), (0.3, 0.0, 1.0), (0.3, 0.0, 1e7)])
+def test_disks_that_cut_the_matrix_off_or_lie_apart_in_none_conduct_nothing(periodic, radius, matrix, inclusion):
+    place = [[0.371, 0.417]] if periodic else [[0.5, 0.5]]
+    disk = ParticlePacking(place, [radius], Box((1.0, 1.0), (periodic,) * 2))
+    result = homogenize_voxel(Composite(disk, matrix, inclusion), resolution=32)
+    assert np.diag(result.tensor).tolist() == [0.0, 0.0]
+    assert result.relative_error_estimate == 0.0
+
+
+def test_small_conductivities_without_insulators_are_kept():
+    layers = np.repeat([[1e-10], [1.0]], 4, axis=0) * np.ones(4)
+    assert solve_cell(layers, (1.0, 1.0), tolerance=1e-12).tensor[0, 0] == pytest.approx(2e-10, rel=1e-6)
+
+
 def test_too_few_iterations_are_an_error_with_its_history():
     with pytest.raises(ConvergenceError, match="Eyre-Milton") as caught:
         solve_cell(random_image(14, (8, 8)), (1.0, 1.0), solver="eyre-milton", limit=3)
     assert len(caught.value.residuals) == 3
     with pytest.raises(ConvergenceError, match="conjugate gradients"):
         solve_cell(random_image(14, (8, 8)), (1.0, 1.0), limit=3)
+
+
+def test_a_contrast_too_large_for_the_iteration_is_called_so():
+    image = random_image(16, (8, 8), (1.0, 1e9))
+    with pytest.raises(ConvergenceError, match=r"contrast 1e\+09 is too large .*: give inf \(or 0\)"):
+        solve_cell(image, (1.0, 1.0), limit=3)
