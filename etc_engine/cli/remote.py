@@ -35,6 +35,9 @@ def connect(server: str, token_file: Path | None) -> Server:
     return Server(server, read_token(token_file, os.environ))
 
 
+NAME_LENGTH = 60
+
+
 def progress_of(study: dict[str, Any]) -> str:
     """A study's state as one line.
 
@@ -42,6 +45,25 @@ def progress_of(study: dict[str, Any]) -> str:
     --------
     >>> progress_of({"id": "7f", "name": "a", "state": "running", "done": 3, "planned": 8, "reason": ""})
     '7f  running    3/8  a'
+    >>> progress_of({"id": "7f", "name": "a", "state": "done", "done": 8, "planned": 8, "failed_cells": 4})
+    '7f  done       8/8  a  (4 cells failed)'
     """
-    reason = f"  ({study['reason']})" if study["reason"] else ""
-    return f"{study['id']}  {study['state']:9s}  {study['done']}/{study['planned']}  {study['name']}{reason}"
+    state = "cancelling" if study.get("cancelling") else study["state"]
+    failed, reason = study.get("failed_cells", 0), study.get("reason", "")
+    remarks = [f"{failed} cell{'s' * (failed != 1)} failed"] if failed else []
+    if reason and reason != study["state"]:
+        remarks.append(shown(reason))
+    remark = f"  ({'; '.join(remarks)})" if remarks else ""
+    return f"{study['id']}  {state:9s}  {study['done']}/{study['planned']}  {shown(study['name'], NAME_LENGTH)}{remark}"
+
+
+def shown(text: str, length: int = 0) -> str:
+    """Words of others, fit for a terminal: what it would obey is escaped, what is too long is cut.
+
+    Examples
+    --------
+    >>> print(shown("a" + chr(27) + "[2J"), shown("abcdef", 4))
+    a\\x1b[2J abc…
+    """
+    plain = "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
+    return f"{plain[: length - 1]}…" if 0 < length < len(plain) else plain

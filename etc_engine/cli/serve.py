@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from pathlib import Path
 
@@ -10,11 +11,28 @@ import click
 from etc_engine.errors import InputError
 
 
+MOST_RANKS = 65_536
+
+
+def _place(_context: click.Context, _option: click.Parameter, text: str) -> Path:
+    """The data directory: no words at all would be the folder one happens to be in."""
+    if not text.strip():
+        raise click.BadParameter("found no name, expected a folder such as ~/etc-data")
+    return Path(text)
+
+
+def _number(_context: click.Context, _option: click.Parameter, value: float) -> float:
+    """What a range does not refuse by itself: nan."""
+    if math.isnan(value):
+        raise click.BadParameter("found nan, expected a number of hours")
+    return value
+
+
 @click.command("serve")
-@click.option("--data", required=True, type=click.Path(path_type=Path), help="Data directory: queue and results.")
+@click.option("--data", required=True, callback=_place, help="Data directory: queue and results.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; any other needs a token.")
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0 takes a free one.")
-@click.option("--ranks", type=click.IntRange(1), default=1, show_default=True, help="MPI ranks of a study.")
+@click.option("--ranks", type=click.IntRange(1, MOST_RANKS), default=1, show_default=True, help="MPI ranks of a study.")
 @click.option("--launcher", type=click.Choice(["local", "slurm"]), default="local", show_default=True)
 @click.option("--sbatch", default="", help="Further options of sbatch, such as '--partition=short --time=2:00:00'.")
 @click.option("--token-file", type=click.Path(path_type=Path), help="File with the token; or ETC_ENGINE_TOKEN.")
@@ -23,7 +41,12 @@ from etc_engine.errors import InputError
 @click.option("--max-particles", type=click.IntRange(1), default=1_000_000, show_default=True, help="Of a packing.")
 @click.option("--max-memory", type=click.IntRange(256), default=8192, show_default=True, help="Of a rank [MB].")
 @click.option(
-    "--max-hours", type=click.FloatRange(0.0, min_open=True), default=168.0, show_default=True, help="Of a study."
+    "--max-hours",
+    type=click.FloatRange(0.0, min_open=True),
+    default=168.0,
+    show_default=True,
+    callback=_number,
+    help="Of a study.",
 )
 def serve_command(
     data: Path,
@@ -52,13 +75,13 @@ def serve_command(
         ) from None
     from etc_engine.service.launchers import find_mpiexec
     from etc_engine.service.settings import Limits, Settings
-    from etc_engine.service.token import read_token
+    from etc_engine.service.token import read_token, readable_by_others
 
     limits = Limits(
         units=max_units,
         cells=10 * max_units,
         particles=max_particles,
-        memory_bytes=max_memory * 1024**2,
+        memory_bytes=max_memory * 10**6,
         study_seconds=3600.0 * max_hours,
     )
     settings = Settings(
@@ -72,6 +95,8 @@ def serve_command(
         sbatch=_words(sbatch),
         limits=limits,
     )
+    if token_file is not None and readable_by_others(token_file):
+        click.echo(f"etc-engine: others can read the token in {token_file}: chmod 600 {token_file}", err=True)
     if settings.launcher == "local" and ranks > 1 and find_mpiexec() is None:
         click.echo("etc-engine: no mpiexec is found: studies run on one process (extra 'mpi')", err=True)
     serve(settings, lambda address: click.echo(f"etc-engine: serving {data} on {address}", err=True))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from etc_engine.cli.remote import connect, progress_of, server_options
+from etc_engine.cli.remote import connect, progress_of, server_options, shown
 
 
 @click.command("status")
@@ -43,4 +43,5 @@ def status_command(
         print_json(one)
     else:
         click.echo(progress_of(one))
-        click.echo(one["log"], nl=False)
+        for line in one["log"].splitlines():
+            click.echo(shown(line))

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, FastAPI, Query, Request
+from fastapi import APIRouter, Depends, FastAPI, Query, Request
 from fastapi.responses import FileResponse, Response
 from pydantic import AfterValidator
 from starlette.concurrency import run_in_threadpool
@@ -39,7 +39,7 @@ from etc_engine.service.messages import (
     Submitted,
 )
 from etc_engine.service.queue import Entry, Queue, State
-from etc_engine.service.refusals import PARTICLES_BODY, REFUSALS, STUDY_BODY, add_refusals
+from etc_engine.service.refusals import PARTICLES_BODY, REFUSALS, STUDY_BODY, add_refusals, refuse_unknown_query
 from etc_engine.service.running import Runner
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
@@ -81,8 +81,8 @@ def _finite(value: float | None) -> float | None:
 
 Finite = Annotated[float | None, AfterValidator(_finite)]
 
-api = APIRouter(prefix="/api", responses=REFUSALS)
-page = APIRouter(include_in_schema=False)
+api = APIRouter(prefix="/api", responses=REFUSALS, dependencies=[Depends(refuse_unknown_query)])
+page = APIRouter(include_in_schema=False, dependencies=[Depends(refuse_unknown_query)])
 
 
 def make_app(service: Service) -> Guard:
@@ -254,6 +254,7 @@ async def solve(
     periodic: Annotated[str | None, Query(pattern="^[xyz]{0,3}$")] = None,
     frame: Annotated[int | None, Query(ge=-(10**9), le=10**9)] = None,
     method: Annotated[str, Query(pattern="^[a-z]{1,20}$")] = "chord",
+    pipe_resistance: Annotated[str | None, Query(pattern="^[a-z]{1,20}$", description="for the method pipe")] = None,
     modes: Annotated[int | None, Query(ge=1, le=30)] = None,
     contact_angle: Annotated[Finite, Query(description="half-angle in degrees of bonded contacts")] = None,
     bond_gap: Annotated[Finite, Query(description="largest bonded gap, in mean radii")] = None,
@@ -266,6 +267,7 @@ async def solve(
         "periodic": periodic,
         "frame": frame,
         "method": method,
+        "pipe-resistance": pipe_resistance,
         "modes": modes,
         "contact-angle": contact_angle,
         "bond-gap": bond_gap,

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 ENDED = ("done", "failed", "cancelled")
 CHUNK = 1 << 20
+PATIENCE = 120.0
+"""Seconds that a service may be away, to be started again, say, before nobody waits for it any more."""
 Told = Callable[[dict[str, Any]], None]
 
 
@@ -86,14 +88,30 @@ def studies(server: Server) -> list[dict[str, Any]]:
     return found
 
 
-def wait(server: Server, study: str, *, tell: Told | None = None, interval: float = 2.0) -> dict[str, Any]:
-    """Wait until a study is done, failed or cancelled; ``tell`` is called with every status on the way."""
+def wait(
+    server: Server, study: str, *, tell: Told | None = None, interval: float = 2.0, patience: float = PATIENCE
+) -> dict[str, Any]:
+    """Wait until a study is done, failed or cancelled; ``tell`` is called with every status on the way.
+
+    Raises
+    ------
+    OutputError
+        If the service has not answered for ``patience`` seconds.
+    """
+    answered = time.monotonic()
     while True:
-        found = status(server, study)
-        if tell is not None:
-            tell(found)
-        if found["state"] in ENDED:
-            return found
+        try:
+            found = status(server, study)
+        except OutputError as error:
+            if time.monotonic() - answered > patience:
+                again = f"the study goes on; ask again with: etc-engine fetch {study}"
+                raise OutputError(f"{error} (asked for {patience:g} s) {again}") from None
+        else:
+            answered = time.monotonic()
+            if tell is not None:
+                tell(found)
+            if found["state"] in ENDED:
+                return found
         time.sleep(interval)
 
 

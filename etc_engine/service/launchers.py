@@ -14,11 +14,14 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from etc_engine.errors import OutputError
+from etc_engine.errors import InputError, OutputError
 from etc_engine.service.processes import ProcessIdentity, kill_batch
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
 
+SLURM = ("sbatch", "squeue", "scancel")
+RANKS_PER_CORE = 16
+"""Ranks more than that are a slip of the pen: one a core is what is fast."""
 HELD = 'ulimit -d "$1" 2>/dev/null; shift; exec "$@"'
 """Holds the memory of what follows (in kilobytes) and becomes it."""
 
@@ -173,6 +176,27 @@ class SlurmLauncher:
         """``scancel`` again, with SIGKILL."""
         if batch:
             subprocess.run(["scancel", "--signal=KILL", batch], capture_output=True, check=False, timeout=60)
+
+
+def check_launcher(settings: Settings) -> None:
+    """Refuse a launcher that cannot start anything here, before the first study waits for it.
+
+    Raises
+    ------
+    InputError
+        If commands of Slurm are not on the PATH, or this machine is asked for far more ranks than it has cores.
+    """
+    if settings.launcher == "slurm":
+        missing = [name for name in SLURM if shutil.which(name) is None]
+        if missing:
+            raise InputError(
+                f"launcher slurm needs {', '.join(SLURM)}, not on the PATH: {', '.join(missing)}; "
+                "start the service on a login node, or with --launcher local"
+            )
+        return
+    most = RANKS_PER_CORE * (os.cpu_count() or 1)
+    if settings.ranks > most:
+        raise InputError(f"found {settings.ranks} ranks, this machine takes at most {most} ({RANKS_PER_CORE} a core)")
 
 
 def make_launcher(store: Store, settings: Settings) -> Launcher:

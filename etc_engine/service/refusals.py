@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import errno
 import logging
 import sqlite3
@@ -11,8 +12,9 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
-from etc_engine.errors import EtcError, StudyError
+from etc_engine.errors import EtcError, InputError, StudyError
 from etc_engine.service.admission import field_of, toml_of
 from etc_engine.service.messages import Problem
 from etc_engine.service.running import BusyError, EngineError
@@ -64,10 +66,29 @@ def add_refusals(app: FastAPI) -> None:
     """Answer every exception of an application in JSON."""
     app.add_exception_handler(RequestValidationError, _refuse_parameter)
     app.add_exception_handler(HTTPException, _refuse_request)
+    app.add_exception_handler(ClientDisconnect, _say_nothing)
     app.add_exception_handler(EtcError, _refuse_input)
     app.add_exception_handler(OSError, _report_failure)
     app.add_exception_handler(sqlite3.Error, _report_failure)
     app.add_exception_handler(Exception, _report_failure)
+
+
+def refuse_unknown_query(request: Request) -> None:
+    """Refuse options in the query that the route does not know, or that are given twice: nothing is ignored.
+
+    Raises
+    ------
+    InputError
+    """
+    known = [parameter.alias for parameter in request.scope["route"].dependant.query_params]
+    given = [name for name, _ in request.query_params.multi_items()]
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(known) or 'none here'}"
+            raise InputError(f"unknown option {name[:80]!r} in the query, {hint}")
+        if given.count(name) > 1:
+            raise InputError(f"the option {name!r} is given twice in the query, expected once")
 
 
 def _problem(status: int, error: str, field: str = "") -> JSONResponse:
@@ -81,6 +102,11 @@ def _refuse_input(_request: Request, error: Exception) -> Response:
     if isinstance(error, BusyError):
         return _problem(429, str(error))
     return _problem(422, str(error), field_of(str(error)) if isinstance(error, StudyError) else "")
+
+
+def _say_nothing(_request: Request, _error: Exception) -> Response:
+    """The client has gone in the middle of its upload: nobody reads the answer."""
+    return Response(status_code=400)
 
 
 def _refuse_request(request: Request, error: Exception) -> Response:

@@ -14,7 +14,7 @@ import uvicorn
 
 from etc_engine.errors import InputError, OutputError
 from etc_engine.service.app import Service, make_app
-from etc_engine.service.launchers import make_launcher
+from etc_engine.service.launchers import check_launcher, make_launcher
 from etc_engine.service.live import LiveResults
 from etc_engine.service.queue import Queue
 from etc_engine.service.running import Runner
@@ -38,11 +38,12 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     Raises
     ------
     InputError
-        If another host than this machine's own is to be served without a token.
+        If another host than this machine's own is to be served without a token, or nothing can be started here.
     OutputError
         If the address is in use, or the data directory is, or that cannot be written.
     """
     check_access(settings)
+    check_launcher(settings)
     import netCDF4  # noqa: F401 - loaded now, so that the first figure does not wait for it
     import xarray  # noqa: F401
 

@@ -40,7 +40,7 @@ class Limits:
     units: int = 100_000
     cells: int = 1_000_000
     particles: int = 1_000_000
-    memory_bytes: int = 8 * 1024**3
+    memory_bytes: int = 8192 * 10**6
     study_seconds: float = 7 * 86400.0
     solve_seconds: float = 120.0
     waiting: int = 10_000

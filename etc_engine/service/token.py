@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -39,3 +40,8 @@ def read_token(path: Path | None, environment: Mapping[str, str] = os.environ) -
     if len(token) < LENGTH or not token.isascii() or not token.isprintable() or " " in token:
         raise InputError(f"the token in {place}: expected one word of at least {LENGTH} ASCII characters")
     return token
+
+
+def readable_by_others(path: Path) -> bool:
+    """Whether a token file can be read by the group or by everybody on this machine."""
+    return bool(path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH))

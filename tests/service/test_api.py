@@ -120,6 +120,11 @@ def test_the_report_is_a_page_that_may_run_nothing(real, finished):
     [
         ({"box": "1,1"}, ["--box", "1,1"]),
         ({"box": "1,1", "contact_angle": 5}, ["--box", "1,1", "--contact-angle", "5"]),
+        ({"box": "1,1", "method": "pipe"}, ["--box", "1,1", "--method", "pipe"]),
+        (
+            {"box": "1,1", "method": "pipe", "pipe_resistance": "uniform"},
+            ["--box", "1,1", "--method", "pipe", "--pipe-resistance", "uniform"],
+        ),
     ],
 )
 def test_a_single_solve_is_that_of_the_command(service, tmp_path, etc_engine, options, arguments):
@@ -159,6 +164,22 @@ def test_refused_particles(service, particles, options, words):
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
     assert str(service.data) not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "words"),
+    [
+        ("POST", "/api/solve?box=1,1&contact-angle=5", "did you mean 'contact_angle'"),
+        ("POST", "/api/solve?box=1,1&box=2,2", "'box' is given twice"),
+        ("POST", "/api/models/maxwell?k1=1", "unknown option 'k1' in the query, allowed: none here"),
+        ("POST", "/api/studies?seed=7", "unknown option 'seed'"),
+        ("GET", "/api/studies?stat=done", "did you mean 'state'"),
+        ("GET", "/?x=1", "unknown option 'x'"),
+    ],
+)
+def test_an_option_nobody_knows_is_not_ignored(service, method, path, words):
+    status, _, body = ask(service.url + path, method, PARTICLES if method == "POST" else None)
+    assert (status, words in json.loads(body)["error"]) == (422, True), body
 
 
 def test_models_are_those_of_the_command(service, etc_engine):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import threading
 
 import pytest
 from serving import STUDY, Service, renamed, until
 
 from etc_engine.batch.dataset import open_dataset
+from etc_engine.cli.remote import progress_of
+from etc_engine.errors import OutputError
 from etc_engine.service import client
 
 TOKEN = "a-token-of-some-length"
@@ -40,13 +43,49 @@ def test_cancel_and_resume(tmp_path, etc_engine):
         server = ["--server", service.url, "--token-file", tmp_path / "token"]
         study = json.loads(etc_engine("submit", tmp_path / "study.toml", *server, "--json").stdout)["id"]
         until(lambda: client.status(service.server, study)["done"] >= 1)
-        assert etc_engine("status", study, *server, "--cancel").returncode == 0
+        cancelled = etc_engine("status", study, *server, "--cancel")
+        assert cancelled.returncode == 0
+        assert cancelled.stdout.split()[1] in ("cancelling", "cancelled")
         ended = client.wait(service.server, study, interval=0.05)
         assert ended["state"] == "cancelled"
+        assert etc_engine("status", study, *server).stdout.splitlines()[0].count("cancelled") == 1
         assert etc_engine("fetch", study, *server, "-o", tmp_path / "out.nc").returncode == 2
         waited = etc_engine("submit", tmp_path / "study.toml", *server, "--wait")
         assert waited.returncode == 0
         assert "6/6  served" in waited.stdout
+
+
+def test_who_waits_outlasts_a_new_start_of_the_service(tmp_path):
+    data, pace = tmp_path / "data", {"ETC_TEST_SECONDS": "0.5"}
+    with Service(data, slow=True, environment=pace) as service:
+        port = int(service.url.rsplit(":", 1)[1])
+        study = client.submit(service.server, STUDY)["id"]
+        seen: list[str] = []
+        waiter = threading.Thread(
+            target=lambda: seen.append(client.wait(service.server, study, interval=0.1, patience=60.0)["state"])
+        )
+        waiter.start()
+        until(lambda: client.status(service.server, study)["done"] >= 1)
+        server = service.server
+    words = rf"the study goes on; ask again with: etc-engine fetch {study}"
+    with pytest.raises(OutputError, match=words):
+        client.wait(server, study, interval=0.1, patience=0.3)
+    with Service(data, {"port": port}, slow=True):
+        waiter.join(timeout=60)
+    assert seen == ["done"]
+
+
+def test_a_line_of_status():
+    study = {"id": "7f", "name": "a", "state": "running", "done": 3, "planned": 8, "reason": "", "cancelling": True}
+    assert progress_of(study) == "7f  cancelling  3/8  a"
+    cancelled = study | {"state": "cancelled", "reason": "cancelled", "cancelling": False}
+    assert progress_of(cancelled) == "7f  cancelled  3/8  a"
+    done = study | {"state": "done", "cancelling": False, "failed_cells": 4}
+    assert progress_of(done).endswith("a  (4 cells failed)")
+    assert progress_of(done | {"failed_cells": 1}).endswith("(1 cell failed)")
+    hostile = progress_of(cancelled | {"name": "\x1b]0;mine\x07\n" + "x" * 500, "reason": "a\x1b[2J"})
+    assert hostile.isprintable()
+    assert hostile == "7f  cancelled  3/8  " + r"\x1b]0;mine\x07\n" + "x" * 42 + r"…  (a\x1b[2J)"
 
 
 @pytest.mark.parametrize(

@@ -166,6 +166,17 @@ def test_long_bodies_are_refused_early(closed):
     assert unannounced.startswith(b"HTTP/1.1 413")
 
 
+@pytest.mark.parametrize("path", ["/api/solve?box=1,1", "/api/studies", "/api/models/maxwell"])
+def test_an_upload_that_breaks_off_is_no_news(service, path):
+    before = service.said()
+    with socket.create_connection(("127.0.0.1", int(service.url.rsplit(":", 1)[1])), timeout=20) as connection:
+        connection.sendall(f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9000\r\n\r\nx,y".encode())
+        time.sleep(0.2)  # until the service waits for the rest
+    time.sleep(0.3)
+    assert ask(f"{service.url}/api/studies")[0] == 200
+    assert service.said() == before
+
+
 def test_answers_forbid_what_a_page_does_not_need(service):
     for path in ("/", "/api/studies", "/api/nothing", "/page/app.js"):
         headers = {name.lower(): value for name, value in ask(service.url + path)[1].items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from browser import ELEMENT, MISSING, Browser
@@ -67,6 +68,10 @@ def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
     browser.until("return location.hash.startsWith('#/study/')")
     first = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length ? w : null")
     assert browser.text("main .state") == "running"
+    told = r"return [/(\d+) of/.exec(document.querySelector('main p').innerText)[1], /over (\d+) /.exec(document.querySelector('figcaption').innerText)[1]]"
+    for _ in range(10):  # one number above and below the figure at any moment
+        above, below = browser.run(told)
+        assert above == below
     assert 0 < browser.run("return document.querySelector('main progress').value") < 15
     browser.until("return document.querySelector('main .state').innerText === 'done'")
     browser.until("return document.querySelector('figcaption').innerText.startsWith('Mean over 15 packings, with')")
@@ -149,14 +154,81 @@ def test_a_pasted_study_is_refused_then_taken_and_cancelled(slow, browser):
     assert browser.complaints() == []
 
 
+DRAW = """const found = figure(arguments[0], new Set(arguments[1]), 900);
+return [found.legend.map(entry => entry[0]), [...found.svg.querySelectorAll('text[text-anchor=end]')].map(t => +t.textContent)]"""
+
+
+def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
+    browser.open(slow.url)
+    flat = {
+        "low": [0.9, 1.9],
+        "high": [1.1, 2.1],
+        "count": [3, 3],
+        "contact_angle": 5.0,
+        "contrast": None,
+        "method": None,
+    }
+    models = [
+        {"name": name, "title": name, "density": [0.5, 0.6], "curves": [values]}
+        for name, values in (
+            ("near", [3.0, 4.0]),
+            ("far", [90.0, 99.0]),
+            ("steep", [1.5, 50.0]),
+            ("hidden", [0.5, 0.6]),
+        )
+    ]
+    curve = {"confidence": 0.95, "density": [0.5, 0.6], "series": [{"mean": [1.0, 2.0], **flat}], "models": models}
+    series = "contact half-angle 5°"
+    assert browser.run(DRAW, curve, [])[0] == [series]
+    assert max(browser.run(DRAW, curve, [])[1]) < 3
+    legend, ticks = browser.run(DRAW, curve, ["near", "far", "steep"])
+    assert legend == [series, "near", "far (outside the picture)", "steep (partly outside the picture)"]
+    assert 4 <= max(ticks) < 5
+
+
+def test_the_queue_tells_failed_cells_and_cuts_names(slow, browser):
+    browser.open(slow.url)
+    assert browser.run("return [0, 1, 4].map(n => failedOf({ failed_cells: n }))") == [
+        "",
+        " (1 cell failed)",
+        " (4 cells failed)",
+    ]
+    assert browser.run("return clean(arguments[0])", "a\x1b\u202eb") == r"a\u{1b}\u{202e}b"
+    assert browser.run("return clean(arguments[0])", "x" * 500) == "x" * 59 + "…"
+
+
+def written_dump(path: Path) -> Path:
+    head = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS ff ff pp\n0 1\n0 1\n-0.5 0.5\n"
+    path.write_text(head + "ITEM: ATOMS id x y z radius\n1 0.25 0.5 0 0.26\n2 0.75 0.5 0 0.26\n")
+    return path
+
+
 def test_a_single_solve_and_a_model(slow, browser, tmp_path):
     (tmp_path / "disks.csv").write_text("x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n")
     browser.open(slow.url + "/#/solve")
     browser.choose_file("#file", tmp_path / "disks.csv")
+    assert browser.run("return document.getElementById('box').value") == ""
+    browser.write("#box", "1,1")
     browser.click("main button.main")
     shown = browser.until("return document.querySelector('dd')?.innerText")
     expected = client.solve(slow.server, (tmp_path / "disks.csv").read_bytes(), box="1,1")["conductivity"]
     assert float(shown) == pytest.approx(expected, rel=1e-7)
+    choose = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change', {bubbles: true}))"
+    for field, word in (("#method", "pipe"), ("#pipe_resistance", "uniform")):
+        browser.run(choose, {ELEMENT: browser.find(field)}, word)
+    browser.click("main button.main")
+    pipe = {"box": "1,1", "method": "pipe", "pipe_resistance": "uniform"}
+    expected = client.solve(slow.server, (tmp_path / "disks.csv").read_bytes(), **pipe)["conductivity"]
+    shown = browser.until(
+        "const d = document.querySelector('dd')?.innerText; return d === arguments[0] ? null : d", shown
+    )
+    assert float(shown) == pytest.approx(expected, rel=1e-7)
+    browser.choose_file("#file", written_dump(tmp_path / "disks.dump"))
+    browser.run(choose, {ELEMENT: browser.find("#method")}, "chord")
+    browser.write("#box", "")
+    browser.click("main button.main")
+    browser.until("const d = document.querySelector('dd')?.innerText; return d && d !== arguments[0]", shown)
+    assert browser.run("return document.querySelector('main p.error')") is None
     browser.run("location.hash = '#/models'")
     browser.find("#model")
     browser.run("const m = document.getElementById('model'); m.value = 'maxwell'; m.dispatchEvent(new Event('change'))")

@@ -83,6 +83,38 @@ def test_a_directory_of_another_kind_stays_as_it_is(tmp_path, refused, name, con
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--data", ""], "found no name, expected a folder"),
+        (["--max-hours", "nan"], "found nan"),
+        (["--max-hours", "0"], "--max-hours"),
+        (["--ranks", "100000"], "--ranks"),
+        (["--ranks", "60000"], "found 60000 ranks, this machine takes at most"),
+    ],
+)
+def test_options_without_a_meaning_are_refused(tmp_path, refused, arguments, words):
+    refused(words, "--data", tmp_path / "d", "--port", 0, *arguments)
+    assert not (tmp_path / "d").exists()
+
+
+def test_slurm_has_to_be_there(tmp_path, refused):
+    refused("not on the PATH: sbatch", "--data", tmp_path / "d", "--launcher", "slurm", PATH=str(tmp_path))
+    assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.parametrize(("mode", "lines"), [(0o600, 0), (0o640, 1), (0o604, 1)])
+def test_a_token_that_others_can_read_is_said(tmp_path, etc_engine, mode, lines):
+    token = tmp_path / "token"
+    token.write_text("a-token-of-some-length")
+    token.chmod(mode)
+    with socket.create_server(("127.0.0.1", 0)) as taken:  # so that it ends at once
+        where = ["--data", tmp_path / "d", "--port", taken.getsockname()[1]]
+        said = etc_engine("serve", *where, "--token-file", token).stderr.splitlines()
+    assert [line for line in said if "others can read the token" in line] == said[:lines]
+    assert len(said) == lines + 1
+
+
 def test_places_that_cannot_be_written(tmp_path, refused):
     (tmp_path / "file").write_text("")
     refused("is a file, expected a folder", "--data", tmp_path / "file", "--port", 0)

@@ -55,6 +55,11 @@ def test_studies_leave_the_queue_in_the_order_they_came(queue):
     assert [entry.id for entry in queue.entries("queued", limit=1, offset=1)] == ["b"]
 
 
+def test_memory_is_told_in_the_unit_of_the_option():
+    with pytest.raises(StudyError, match=r"this service allows 8192 MB$"):
+        apply(STUDY.replace("box = [1.0, 1.0]", "box = [100000.0, 1.0]"), replace(Limits(), particles=10**9))
+
+
 def test_progress_is_what_decides_about_another_attempt(queue):
     queue.submit("a", "a", 4, 4)
     for attempt in (1, 2):

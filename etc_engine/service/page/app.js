@@ -61,6 +61,13 @@ function download(path, label) {
   } }, label);
 }
 
+// Words of others: what has no picture is shown by its number, what is too long is cut.
+const NAME_LENGTH = 60;
+function clean(text) {
+  const letters = [...text.replace(/[\p{C}\p{Zl}\p{Zp}]/gu, letter => `\\u{${letter.codePointAt(0).toString(16)}}`)];
+  return letters.length > NAME_LENGTH ? letters.slice(0, NAME_LENGTH - 1).join("") + "…" : letters.join("");
+}
+
 // ---- the queue
 
 async function refreshQueue() {
@@ -68,11 +75,11 @@ async function refreshQueue() {
   const shown = location.hash.replace("#/study/", "");
   const items = studies.map(study => h("li", {},
     h("a", { href: `#/study/${study.id}`, "aria-current": study.id === shown ? "page" : null },
-      h("span", { class: "row" }, h("span", { class: "name" }, study.name),
+      h("span", { class: "row" }, h("span", { class: "name" }, clean(study.name)),
         h("span", { class: `state ${study.state}` }, stateOf(study))),
       study.state === "running" || study.state === "queued"
-        ? h("progress", { max: study.planned, value: study.done, "aria-label": `progress of ${study.name}` }) : null,
-      h("span", { class: "row faint" }, h("span", {}, `${study.done} of ${study.planned} packings`)))));
+        ? h("progress", { max: study.planned, value: study.done, "aria-label": `progress of ${clean(study.name)}` }) : null,
+      h("span", { class: "row faint" }, h("span", {}, `${study.done} of ${study.planned} packings${failedOf(study)}`)))));
   const focused = document.activeElement && document.activeElement.closest("#queue") ? document.activeElement.hash : null;
   $("queue").replaceChildren(...items);
   if (focused) { const again = $("queue").querySelector(`a[href="${focused}"]`); if (again) again.focus(); }
@@ -80,7 +87,8 @@ async function refreshQueue() {
   $("queue-more").textContent = total > studies.length ? `and ${total - studies.length} older ones` : "";
   return studies.some(study => study.state === "running" || study.state === "queued");
 }
-const stateOf = study => study.cancelling ? "stopping" : study.state;
+const failedOf = study => study.failed_cells ? ` (${study.failed_cells} cell${study.failed_cells === 1 ? "" : "s"} failed)` : "";
+const stateOf = study => study.cancelling ? "cancelling" : study.state;
 
 // ---- a new study
 
@@ -293,7 +301,7 @@ function study(id) {
       active && !found.cancelling ? act("Cancel", () => post(`${path}/cancel`, "")) : null,
       found.state === "cancelled" || found.state === "failed" ? act("Resume", () => post(`${path}/resume`, ""), "main") : null,
       found.state !== "running" ? act("Remove", async () => {
-        if (!confirm(`Remove the study ${found.name} with all its results?`)) return;
+        if (!confirm(`Remove the study ${clean(found.name)} with all its results?`)) return;
         await ask(path, { method: "DELETE" });
         location.hash = "#/new";
       }) : null].filter(Boolean));
@@ -338,17 +346,20 @@ function study(id) {
     if (curve.bounds_broken) models.prepend(h("p", { class: "error" }, "A rigorous bound is broken: look at the report."));
     if (focused && $(focused)) $(focused).focus();
   }
+  // The packings of the figure, so that the page tells one number: the queue counts on while a figure is made.
+  function fillCounts(found) {
+    const done = units < 0 ? found.done : units, more = found.most > found.planned ? ` (adaptive: ${found.most} at most)` : "";
+    bar.max = found.planned; bar.value = done;
+    counts.replaceChildren(state, ` – ${done} of ${found.planned} packings${more}${failedOf(found)}`);
+  }
   async function poll() {
     const found = await get(`/api/studies/${id}`);
-    title.textContent = found.name;
+    title.textContent = clean(found.name);
     state.textContent = stateOf(found);
     state.className = `state ${found.state}`;
     reason.textContent = found.reason === found.state ? "" : found.reason;
-    bar.max = found.planned; bar.value = found.done;
     bar.hidden = found.state === "done";
-    const failed = found.failed_cells ? `, ${found.failed_cells} results without a conductivity` : "";
-    const more = found.most > found.planned ? ` (adaptive: ${found.most} at most)` : "";
-    counts.replaceChildren(state, ` – ${found.done} of ${found.planned} packings${more}${failed}`);
+    fillCounts(found);
     log.textContent = found.log || "nothing yet";
     fillButtons(found);
     const version = `${found.state} ${found.done}`;
@@ -358,6 +369,7 @@ function study(id) {
       units = curve.units;
       lagging = found.state === "running" && units < found.done;
       drawn = version;
+      fillCounts(found);
     }
     return found.state === "running" || found.state === "queued";
   }
@@ -375,20 +387,26 @@ function facts(entries) {
 
 function solve() {
   const field = (id, label, control, hint) => h("div", { class: "field" }, h("label", { for: id }, label), control, h("p", { class: "hint" }, hint));
-  const input = (id, value, hint, label) => field(id, label, h("input", { id, name: id, value, autocomplete: "off" }), hint);
+  const input = (id, placeholder, hint, label) => field(id, label, h("input", { id, name: id, placeholder, autocomplete: "off" }), hint);
   const answer = h("div", { "aria-live": "polite" }), button = h("button", { class: "main" }, "Solve");
   const form = h("form", { novalidate: true }, h("fieldset", {}, h("legend", {}, "Particles"), h("div", { class: "fields" },
     field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS dump"),
     input("box", "1,1", "edge lengths, for CSV; a dump brings its own", "Box"), input("periodic", "", "such as xy, for CSV", "Periodic axes"),
-    field("method", "Method", h("select", { id: "method", name: "method" }, about.conduction_methods.dtem.map(m => h("option", {}, m))), ""),
+    field("method", "Method", h("select", { id: "method", name: "method" }, [...about.conduction_methods.dtem, "pipe"].map(m => h("option", {}, m))), ""),
+    field("pipe_resistance", "Pipe resistance", h("select", { id: "pipe_resistance", name: "pipe_resistance" },
+      about.conduction_methods.pipe.map(m => h("option", {}, m))), "with the method pipe"),
     input("contact_angle", "", "degrees; empty: overlaps", "Contact half-angle"), input("conductivity", "", "of the particles [W/(m K)]", "Conductivity"))),
     h("div", { class: "buttons" }, button));
+  const pipe = form.querySelector("#pipe_resistance").closest(".field"), hide = () => { pipe.hidden = form.elements.method.value !== "pipe"; };
+  form.addEventListener("change", hide);
+  hide();
   form.addEventListener("submit", async event => {
     event.preventDefault();
     const file = $("file").files[0];
     if (!file) { answer.replaceChildren(h("p", { class: "error" }, "Choose a file first.")); return; }
     const query = new URLSearchParams();
-    for (const name of ["box", "periodic", "method", "contact_angle", "conductivity"]) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
+    const names = ["box", "periodic", "method", "contact_angle", "conductivity", ...form.elements.method.value === "pipe" ? ["pipe_resistance"] : []];
+    for (const name of names) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
     button.disabled = true;
     answer.replaceChildren(h("p", { class: "faint" }, "Solving …"));
     try {

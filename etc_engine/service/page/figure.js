@@ -31,6 +31,31 @@ function range(values, margin, fallback) {
   return [low - more, high + more];
 }
 
+const FAR = 3; // heights of the simulation that the figure grows by, at most, for the sake of a model
+
+// The vertical range: the simulation, and every drawn model that does not make it too small to be read.
+function upright(curve, models, across) {
+  const all = curve.series.flatMap(s => [...s.mean, ...s.low, ...s.high]).filter(value => value !== null);
+  const low = Math.min(...all), high = Math.max(...all), room = FAR * (Math.max(high - low, 0.2 * Math.abs(high)) || 1);
+  for (const model of models) {
+    const values = seen(model, across);
+    if (values.every(value => value > low - room && value < high + room)) all.push(...values);
+  }
+  return range(all, 0.07, 0.2);
+}
+
+// What a model has between the ends of the horizontal axis.
+function seen(model, across) {
+  return model.curves.flatMap(values => values.filter((value, i) =>
+    value !== null && model.density[i] !== null && model.density[i] >= across[0] && model.density[i] <= across[1]));
+}
+
+function absence(model, across, up) {
+  const values = seen(model, across), inside = values.filter(value => value >= up[0] && value <= up[1]);
+  if (inside.length === values.length) return "";
+  return inside.length ? " (partly outside the picture)" : " (outside the picture)";
+}
+
 function mark(shape, x, y, colour) {
   const size = 4.6, common = { fill: colour, stroke: "none" };
   if (shape % 4 === 0) return draw("circle", { cx: x, cy: y, r: size, ...common });
@@ -63,8 +88,8 @@ function runs(density, ...lists) {
 function figure(curve, shownModels, room) {
   const WIDTH = room < 600 ? 520 : 900;
   const across = range(curve.density, 0.04, 0.05);
-  const all = curve.series.flatMap(s => [...s.mean, ...s.low, ...s.high]);
-  const up = range(all, 0.07, 0.2);
+  const drawn = curve.models.filter(model => shownModels.has(model.name));
+  const up = upright(curve, drawn, across);
   const X = x => LEFT + (x - across[0]) / (across[1] - across[0]) * (WIDTH - LEFT - RIGHT);
   const Y = y => HEIGHT - BOTTOM - (y - up[0]) / (up[1] - up[0]) * (HEIGHT - TOP - BOTTOM);
   const at = (x, y) => `${X(x).toFixed(2)} ${Y(y).toFixed(2)}`;
@@ -90,7 +115,7 @@ function figure(curve, shownModels, room) {
   const plot = draw("g", { "clip-path": "url(#plot)" });
   svg.append(plot);
   const legend = [];
-  curve.models.filter(model => shownModels.has(model.name)).forEach((model, number) => {
+  drawn.forEach((model, number) => {
     const dash = DASHES[number % DASHES.length];
     for (const values of model.curves) {
       for (const run of runs(model.density, values)) {
@@ -99,7 +124,7 @@ function figure(curve, shownModels, room) {
       }
     }
     const sample = draw("path", { class: "model", d: "M1 7H33", "stroke-dasharray": dash });
-    legend.push([model.title, draw("svg", { class: "curve", viewBox: "0 0 34 14", "aria-hidden": "true" }, sample)]);
+    legend.push([model.title + absence(model, across, up), draw("svg", { class: "curve", viewBox: "0 0 34 14", "aria-hidden": "true" }, sample)]);
   });
   curve.series.forEach((series, number) => {
     const colour = COLOURS[number % COLOURS.length], name = seriesName(series);
