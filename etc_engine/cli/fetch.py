@@ -7,6 +7,9 @@ from pathlib import Path
 import click
 
 from etc_engine.cli.remote import connect, server_options
+from etc_engine.errors import InputError
+
+PARTS = {".nc": "result.nc", ".html": "report.html"}
 
 
 @click.command("fetch")
@@ -24,7 +27,9 @@ def fetch_command(study: str, server: str, token_file: Path | None, output: Path
     from etc_engine.cli.options import check_place
     from etc_engine.service import client
 
+    part = PARTS.get(output.suffix)
+    if part is None:
+        raise InputError(f"a result is written as .nc, its report as .html: found {str(output)!r}")
     check_place(output)
-    part = "report.html" if output.suffix == ".html" else "result.nc"
     client.download(connect(server, token_file), study, output, part)
     click.echo(f"{output}: {output.stat().st_size / 1e6:.2g} MB")

@@ -10,7 +10,6 @@ import click
 
 from etc_engine.errors import InputError
 
-
 MOST_RANKS = 65_536
 
 

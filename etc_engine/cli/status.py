@@ -14,9 +14,10 @@ from etc_engine.cli.remote import connect, progress_of, server_options, shown
 @server_options
 @click.option("--cancel", is_flag=True, help="End it; what is finished is kept.")
 @click.option("--resume", is_flag=True, help="Go on with it after it was cancelled or has failed.")
+@click.option("--remove", is_flag=True, help="Forget it with all its files; one that runs has to be cancelled first.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def status_command(
-    study: str | None, server: str, token_file: Path | None, cancel: bool, resume: bool, as_json: bool
+    study: str | None, server: str, token_file: Path | None, cancel: bool, resume: bool, remove: bool, as_json: bool
 ) -> None:
     """Show the queue of a service, or state, progress and log of one STUDY (its identity)."""
     from etc_engine.cli.options import print_json
@@ -24,16 +25,23 @@ def status_command(
 
     place = connect(server, token_file)
     if study is None:
-        if cancel or resume:
-            raise click.UsageError("--cancel and --resume need the identity of a study")
+        if cancel or resume or remove:
+            raise click.UsageError("--cancel, --resume and --remove need the identity of a study")
         found = client.studies(place)
         if as_json:
             print_json({"studies": found})
         else:
             click.echo("\n".join(map(progress_of, found)) or "no studies")
         return
-    if cancel and resume:
-        raise click.UsageError("--cancel and --resume exclude each other")
+    if cancel + resume + remove > 1:
+        raise click.UsageError("--cancel, --resume and --remove exclude each other")
+    if remove:
+        client.remove(place, study)
+        if as_json:
+            print_json({"id": study, "state": "removed"})
+        else:
+            click.echo(f"{study}  removed")
+        return
     if cancel:
         client.cancel(place, study)
     if resume:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from etc_engine.cli.remote import connect, progress_of, server_options
+from etc_engine.errors import InputError
 
 EXIT_FAILED_CELLS = 4
 EXIT_RESUMABLE = 75
@@ -32,6 +33,8 @@ def submit_command(
 
     _, text = read_study(study)
     if output is not None:
+        if output.suffix != ".nc":
+            raise InputError(f"a result is written as .nc: found {str(output)!r}")
         check_place(output, study)
     place = connect(server, token_file)
     found = client.submit(place, text)

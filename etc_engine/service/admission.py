@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -68,6 +69,8 @@ def apply(text: str, limits: Limits) -> Application:
     """
     try:
         study = parse_study(text, SOURCE)
+        if tomllib.loads(text)["schema"] is True:  # which Python takes for 1
+            raise StudyError(f"{SOURCE}: schema: found true, allowed: 1")
         found = _measure(study, text)
     except (RecursionError, ArithmeticError) as error:  # a thousand brackets; radii of 1e300
         what = "is nested too deeply" if isinstance(error, RecursionError) else "has numbers out of range"

@@ -39,7 +39,15 @@ from etc_engine.service.messages import (
     Submitted,
 )
 from etc_engine.service.queue import Entry, Queue, State
-from etc_engine.service.refusals import PARTICLES_BODY, REFUSALS, STUDY_BODY, add_refusals, refuse_unknown_query
+from etc_engine.service.refusals import (
+    PARTICLES_BODY,
+    REFUSALS,
+    STUDY_BODY,
+    add_refusals,
+    distinct_keys,
+    refuse_repeated_keys,
+    refuse_unknown_query,
+)
 from etc_engine.service.running import Runner
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
@@ -213,6 +221,7 @@ def resume_study(request: Request, study: Id) -> StudySummary:
     return StudySummary.of(_entry(request, study))
 
 
+@api.head("/studies/{study}/study.toml", include_in_schema=False)
 @api.get("/studies/{study}/study.toml", responses={200: {"content": {"text/plain": {}}}})
 def study_text(request: Request, study: Id) -> Response:
     """The study as it was handed in."""
@@ -229,6 +238,7 @@ async def study_curve(request: Request, study: Id) -> Response:
     return Response(answer, media_type="application/json")
 
 
+@api.head("/studies/{study}/result.nc", include_in_schema=False)
 @api.get("/studies/{study}/result.nc", response_class=FileResponse)
 def study_result(request: Request, study: Id) -> FileResponse:
     """The result as netCDF."""
@@ -236,6 +246,7 @@ def study_result(request: Request, study: Id) -> FileResponse:
     return FileResponse(_service(request).store.result(study), media_type="application/x-netcdf", filename=name)
 
 
+@api.head("/studies/{study}/report.html", include_in_schema=False)
 @api.get("/studies/{study}/report.html", response_class=FileResponse)
 def study_report(request: Request, study: Id) -> FileResponse:
     """The report as one HTML page; it is made when it is first asked for."""
@@ -292,19 +303,21 @@ def describe_model(name: str) -> dict[str, Any]:
     return _plain_record(record(_model(name)))
 
 
-@api.post("/models/{name}")
+@api.post("/models/{name}", dependencies=[Depends(refuse_repeated_keys)])
 def evaluate_model(name: str, inputs: Modelled) -> dict[str, Any]:
     """The conductivity by a model; null where it is infinite."""
     phases = {"k1": inputs.k1, "k2": inputs.k2, "fraction": inputs.fraction}
     return _plain_record(evaluation(_model(name), phases, inputs.dimension, inputs.parameters))
 
 
+@page.head("/")
 @page.get("/")
 def front_page() -> Response:
     """The web page."""
     return Response(files(__package__).joinpath("page/index.html").read_bytes(), media_type="text/html; charset=utf-8")
 
 
+@page.head("/page/{name}")
 @page.get("/page/{name}")
 def page_file(name: Literal["app.js", "figure.js", "style.css", "icon.svg"]) -> Response:
     """A part of the web page."""
@@ -345,7 +358,9 @@ async def _study_text(request: Request) -> str:
     if "json" not in request.headers.get("content-type", ""):
         return text
     try:
-        values = json.loads(text)
+        values = json.loads(text, object_pairs_hook=distinct_keys)
+    except InputError as error:
+        raise StudyError(f"{SOURCE}: {error}") from None
     except (ValueError, RecursionError) as error:
         raise StudyError(f"{SOURCE}: is not valid JSON: {error}") from None
     if not isinstance(values, dict):

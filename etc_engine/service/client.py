@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tempfile
 import time
 import urllib.error
@@ -31,6 +32,7 @@ from etc_engine.errors import InputError, OutputError
 if TYPE_CHECKING:
     import xarray
 
+IDENTITY = "expected 16 hexadecimal digits, the identity that submit and status print"
 ENDED = ("done", "failed", "cancelled")
 CHUNK = 1 << 20
 PATIENCE = 120.0
@@ -79,7 +81,7 @@ def submit(server: Server, study: str | Mapping[str, Any]) -> dict[str, Any]:
 
 def status(server: Server, study: str) -> dict[str, Any]:
     """State, progress and the end of the log of a study."""
-    return _json(server, "GET", f"/api/studies/{_safe(study)}")
+    return _json(server, "GET", f"/api/studies/{_identity(study)}")
 
 
 def studies(server: Server) -> list[dict[str, Any]]:
@@ -117,12 +119,17 @@ def wait(
 
 def cancel(server: Server, study: str) -> dict[str, Any]:
     """End a study; what is finished is kept."""
-    return _json(server, "POST", f"/api/studies/{_safe(study)}/cancel", b"")
+    return _json(server, "POST", f"/api/studies/{_identity(study)}/cancel", b"")
 
 
 def resume(server: Server, study: str) -> dict[str, Any]:
     """Go on with a cancelled or failed study."""
-    return _json(server, "POST", f"/api/studies/{_safe(study)}/resume", b"")
+    return _json(server, "POST", f"/api/studies/{_identity(study)}/resume", b"")
+
+
+def remove(server: Server, study: str) -> None:
+    """Forget a study that does not run, with all its files."""
+    _open(server, "DELETE", f"/api/studies/{_identity(study)}").close()
 
 
 def fetch(server: Server, study: str, output: Path | None = None) -> xarray.Dataset:
@@ -150,7 +157,7 @@ def download(server: Server, study: str, output: Path, part: str = "result.nc") 
     """Write the result (or ``report.html``) of a study to a file, whole or not at all."""
     draft = output.with_name(f".{output.name}.{os.getpid()}.tmp")
     try:
-        with _open(server, "GET", f"/api/studies/{_safe(study)}/{part}") as answer:
+        with _open(server, "GET", f"/api/studies/{_identity(study)}/{part}") as answer:
             expected = int(answer.headers.get("content-length", -1))  # type: ignore[attr-defined]
             with draft.open("wb") as file:
                 while block := answer.read(CHUNK):
@@ -187,6 +194,12 @@ def evaluate(server: Server, model: str, **inputs: Any) -> dict[str, Any]:
     values = {key: str(value) if value in (float("inf"),) else value for key, value in common.items()}
     body = json.dumps({**values, "parameters": inputs}).encode()
     return _json(server, "POST", f"/api/models/{_safe(model)}", body, "application/json")
+
+
+def _identity(study: str) -> str:
+    if not re.fullmatch("[0-9a-f]{16}", study):
+        raise InputError(f"study {study[:80]!r}: {IDENTITY}")
+    return study
 
 
 def _safe(word: str) -> str:

@@ -87,7 +87,7 @@ class Guard:
         ):
             return 403, "requests from pages of other sites are refused"
         if self._token and path not in OPEN and not self._authorized(headers.get("authorization", "")):
-            return 401, "a token is needed: header 'Authorization: Bearer TOKEN', option --token-file of the commands"
+            return 401, _unknown(headers.get("authorization", ""))
         return None
 
     def _authorized(self, header: str) -> bool:
@@ -109,6 +109,13 @@ class Guard:
         if name in {*LOOPBACK, self._settings.host, *self._settings.hosts}:
             return True
         return bool(self._token) and _is_address(name)  # an address cannot be rebound
+
+
+def _unknown(header: str) -> str:
+    kind, _, shown = header.partition(" ")
+    if kind.lower() == "bearer" and shown.strip():
+        return "the token is wrong: this service was started with another one"
+    return "a token is needed: header 'Authorization: Bearer TOKEN', option --token-file of the commands"
 
 
 def host_name(header: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import json
 import logging
 import sqlite3
 from typing import Any
@@ -16,6 +17,7 @@ from starlette.requests import ClientDisconnect
 
 from etc_engine.errors import EtcError, InputError, StudyError
 from etc_engine.service.admission import field_of, toml_of
+from etc_engine.service.client import IDENTITY
 from etc_engine.service.messages import Problem
 from etc_engine.service.running import BusyError, EngineError
 
@@ -50,6 +52,7 @@ PARTICLES_BODY = {
         },
     }
 }
+EXPECTED = 'expected an object such as {"k1": 1.0, "k2": 10.0, "fraction": 0.3} as application/json'
 REFUSALS: dict[int | str, dict[str, Any]] = {
     400: {"model": Problem, "description": "the body cannot be read"},
     401: {"model": Problem, "description": "a token is needed"},
@@ -91,6 +94,38 @@ def refuse_unknown_query(request: Request) -> None:
             raise InputError(f"the option {name!r} is given twice in the query, expected once")
 
 
+def distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object whose keys are all different, for ``json.loads``.
+
+    Examples
+    --------
+    >>> json.loads('{"k1": 1, "k1": 2}', object_pairs_hook=distinct_keys)
+    Traceback (most recent call last):
+    etc_engine.errors.InputError: the key 'k1' is given twice in a JSON object, expected once
+    """
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"the key {twice[:80]!r} is given twice in a JSON object, expected once")
+    return found
+
+
+async def refuse_repeated_keys(request: Request) -> None:
+    """Refuse a JSON body in which one key hides another.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        json.loads(await request.body(), object_pairs_hook=distinct_keys)
+    except InputError:
+        raise
+    except (ValueError, RecursionError):  # no JSON at all: refused where the body is read
+        return
+
+
 def _problem(status: int, error: str, field: str = "") -> JSONResponse:
     return JSONResponse({"error": " ".join(error.split()), "field": field}, status)
 
@@ -114,6 +149,8 @@ def _refuse_request(request: Request, error: Exception) -> Response:
     reason = str(error.detail)
     if reason == "Not Found":
         reason = f"there is nothing at {request.url.path[:200]}"
+    if error.status_code == 400:
+        reason = f"the body cannot be read as JSON; {EXPECTED}"
     return _problem(error.status_code, reason)
 
 
@@ -121,6 +158,12 @@ def _refuse_parameter(_request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     field = ".".join(str(step) for step in first["loc"][1:])
+    if first["type"] == "json_invalid":
+        return _problem(422, f"the body is not valid JSON: {first['ctx']['error']} at character {field}; {EXPECTED}")
+    if first["loc"] == ("body",):
+        return _problem(422, f"the body is not a JSON object, or not said to be one by its Content-Type; {EXPECTED}")
+    if first["loc"] == ("path", "study"):
+        return _problem(422, f"study {str(first['input'])[:80]!r}: {IDENTITY}")
     return _problem(422, f"{field or 'body'}: {first['msg']}", field)
 
 

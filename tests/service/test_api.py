@@ -219,7 +219,7 @@ def test_refused_models(service, model, inputs, words):
         (("box = [1.0, 1.0]", "box = [1e6, 1e6]"), "packing.box", "this service allows 1000000"),
         (("uniform:0.03:0.06", "equal:1e200"), "", "out of range"),
         (("[packing]", "[packing"), "", "not valid TOML"),
-        (("box = [1.0, 1.0]", "box = " + "[" * 5000), "", "nested"),
+        (("box = [1.0, 1.0]", "box = " + "[" * 5000), "", "not valid TOML"),
     ],
 )
 def test_a_refused_study_says_which_field(service, change, field, words):
@@ -240,6 +240,43 @@ def test_refused_json(service, body):
     status, _, answer = ask(f"{service.url}/api/studies", "POST", body, content_type="application/json")
     assert status in (413, 422)
     assert json.loads(answer)["error"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "words"),
+    [
+        ("/api/studies", b'{"schema": 1, "schema": 1}', "study: the key 'schema' is given twice"),
+        ("/api/studies", b'{"packing": {"count": 1, "count": 2}}', "study: the key 'count' is given twice"),
+        ("/api/models/maxwell", b'{"k1": 1.0, "k1": 2.0}', "the key 'k1' is given twice"),
+        ("/api/models/maxwell", b'{"k1": }', "the body is not valid JSON: Expecting value at character 7; expected"),
+        ("/api/models/maxwell", b"[1]", "the body is not a JSON object"),
+        ("/api/models/maxwell", b"", "expected"),
+        ("/api/models/maxwell", b"\xff", "the body cannot be read as JSON; expected"),
+        ("/api/studies/xyz/resume", b"", "study 'xyz': expected 16 hexadecimal digits"),
+    ],
+)
+def test_what_is_no_good_json_is_told_plainly(service, path, body, words):
+    status, _, answer = ask(service.url + path, "POST", body, content_type="application/json")
+    assert (status, words in json.loads(answer)["error"]) == (400 if body == b"\xff" else 422, True), answer
+
+
+def test_true_is_no_number_of_a_schema(service):
+    for word, expected in (("true", 422), ("1", 200)):
+        text = STUDY.replace("schema = 1", f"schema = {word}")
+        status, _, body = ask(f"{service.url}/api/studies/check", "POST", text.encode())
+        assert status == expected, body
+    assert json.loads(ask(f"{service.url}/api/studies/check", "POST", text.encode())[2])["name"] == "served"
+
+
+def test_head_tells_what_get_would_bring(real, finished):
+    for path in (
+        "/",
+        "/page/app.js",
+        *(f"/api/studies/{finished['id']}/{part}" for part in ("result.nc", "study.toml")),
+    ):
+        status, headers, body = ask(real.url + path, "HEAD")
+        assert (status, body) == (200, b"")
+        assert int(headers["content-length"]) == len(ask(real.url + path)[2])
 
 
 def test_a_check_tells_the_size_and_runs_nothing(service):
@@ -338,6 +375,6 @@ def test_a_batch_that_always_dies_is_given_up_and_says_so(tmp_path):
 
 def test_the_client_names_what_is_not_there():
     with pytest.raises(OutputError, match=r"does not answer .*is the service running there"):
-        client.status(client.Server("http://127.0.0.1:9"), "0")
+        client.status(client.Server("http://127.0.0.1:9"), "0123456789abcdef")
     with pytest.raises(InputError, match="expected an address"):
         client.Server("ftp://x")

@@ -53,6 +53,9 @@ def test_cancel_and_resume(tmp_path, etc_engine):
         waited = etc_engine("submit", tmp_path / "study.toml", *server, "--wait")
         assert waited.returncode == 0
         assert "6/6  served" in waited.stdout
+        assert etc_engine("status", study, *server, "--remove").stdout == f"{study}  removed\n"
+        assert client.studies(service.server) == []
+        assert not (tmp_path / "data" / "studies" / study).exists()
 
 
 def test_who_waits_outlasts_a_new_start_of_the_service(tmp_path):
@@ -96,7 +99,13 @@ def test_a_line_of_status():
         (["submit", "large.toml"], "this service allows 100000"),
         (["submit", "good.toml", "-o", "none/out.nc"], "cannot write none/out.nc"),
         (["status", "0123456789abcdef"], "there is no study 0123456789abcdef"),
-        (["status", "../x"], "there is nothing at /api/studies/../x"),
+        (["status", "../x"], "study '../x': expected 16 hexadecimal digits"),
+        (["status", ""], "study '': expected 16 hexadecimal digits, the identity that submit and status print"),
+        (["fetch", "0123456789abcdef", "-o", "r.csv"], "written as .nc, its report as .html: found 'r.csv'"),
+        (["submit", "good.toml", "-o", "r.csv"], "written as .nc: found 'r.csv'"),
+        (["status", "--remove"], "need the identity"),
+        (["status", "0123456789abcdef", "--remove"], "there is no study"),
+        (["status", "0123456789abcdef", "--remove", "--cancel"], "exclude each other"),
         (["status", "--cancel"], "need the identity"),
         (["fetch", "0123456789abcdef", "-o", "out.nc"], "there is no study"),
         (["fetch", "0123456789abcdef"], "Missing option '-o'"),

@@ -68,7 +68,8 @@ def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
     browser.until("return location.hash.startsWith('#/study/')")
     first = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length ? w : null")
     assert browser.text("main .state") == "running"
-    told = r"return [/(\d+) of/.exec(document.querySelector('main p').innerText)[1], /over (\d+) /.exec(document.querySelector('figcaption').innerText)[1]]"
+    count = "/([0-9]+) (of|packings)/.exec(document.querySelector(s).innerText)[1]"
+    told = f"return ['main p', 'figcaption'].map(s => {count})"
     for _ in range(10):  # one number above and below the figure at any moment
         above, below = browser.run(told)
         assert above == below
@@ -155,7 +156,8 @@ def test_a_pasted_study_is_refused_then_taken_and_cancelled(slow, browser):
 
 
 DRAW = """const found = figure(arguments[0], new Set(arguments[1]), 900);
-return [found.legend.map(entry => entry[0]), [...found.svg.querySelectorAll('text[text-anchor=end]')].map(t => +t.textContent)]"""
+return [found.legend.map(entry => entry[0]),
+    [...found.svg.querySelectorAll('text[text-anchor=end]')].map(t => +t.textContent)]"""
 
 
 def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
@@ -251,7 +253,7 @@ def test_the_page_asks_for_the_token_and_keeps_it_out_of_every_address(tmp_path,
         browser.until("return !document.getElementById('token').hidden")
         browser.write("#token-word", "a-wrong-word-of-some-length")
         browser.click("#token button")
-        browser.until("return !document.getElementById('token').hidden")
+        browser.until("return document.getElementById('token-label').innerText.startsWith('The token is wrong')")
         browser.write("#token-word", token)
         browser.click("#token button")
         browser.find("#queue a")

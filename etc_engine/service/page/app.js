@@ -30,7 +30,10 @@ async function ask(path, options = {}) {
   if (answer.ok) return answer;
   let problem = { error: `The service answers ${answer.status}.` };
   try { problem = await answer.json(); } catch { /* not from the service itself */ }
-  if (answer.status === 401) $("token").hidden = false;
+  if (answer.status === 401) {
+    $("token").hidden = false;
+    $("token-label").textContent = token ? "The token is wrong; try another one" : "This service asks for a token";
+  }
   throw new Refusal(answer.status, problem);
 }
 const get = async path => (await ask(path)).json();
