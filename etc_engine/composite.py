@@ -17,6 +17,12 @@ from etc_engine.packing.structure import solid_fraction
 MATRIX = -1
 """What `Composite.phase` answers for a point in the matrix."""
 
+SPAN = 1e15
+"""Largest ratio of two finite conductivities, ..."""
+
+EXTREME = 1e100
+"""... and the largest of one, or of its inverse [W/(m K)]."""
+
 ROUNDING = 1e-9
 """Overlaps below this, in mean radii, are contacts."""
 
@@ -78,6 +84,7 @@ class Composite:
             raise InputError(f"the conductivity of the matrix must be finite and not negative, found {matrix:g}")
         if matrix == 0.0 and not values.any():
             raise InputError("neither the matrix nor an inclusion conducts: give at least one a conductivity above 0")
+        _refuse_span(np.append(values.ravel(), matrix))
         object.__setattr__(self, "inclusion", np.broadcast_to(values, (self.inclusions.count,)))
         object.__setattr__(self, "matrix", matrix)
         if self.volume_fraction >= 1.0 - 1e-12:
@@ -134,6 +141,18 @@ class Composite:
     def conductivity_at(self, points: ArrayLike) -> NDArray[np.float64]:
         """Conductivity at each point, shape (m,) [W/(m K)]; points as in `phase`."""
         return np.append(self.inclusion, self.matrix)[self.phase(points)]
+
+
+def _refuse_span(conductivities: NDArray[np.float64]) -> None:
+    """Refuse conductivities too far from each other, or from 1, for double precision."""
+    finite = conductivities[(conductivities > 0.0) & np.isfinite(conductivities)]
+    least, largest = float(finite.min(initial=np.inf)), float(finite.max(initial=0.0))
+    if least < 1.0 / EXTREME or largest > EXTREME or largest / least > SPAN:
+        raise InputError(
+            f"the conductivities reach from {least:g} to {largest:g} W/(m K): allowed are numbers from "
+            f"{1.0 / EXTREME:g} to {EXTREME:g} within a factor of {SPAN:g}; give 0 or inf for what hardly or "
+            "perfectly conducts"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,10 +21,17 @@ from etc_engine.batch.study_tables import (
     distribution,
 )
 from etc_engine.box import Box, parse_periodic
-from etc_engine.errors import StudyError
+from etc_engine.errors import InputError, StudyError
 from etc_engine.packing import PackingSpec
 from etc_engine.realization import ENGINES, CompositeSpec, ConductionSpec, ContactSpec, Mixture, RealizationSpec
 from etc_engine.schema import StudyTable, Word, first_problem
+from etc_engine.voxel.voxelization import check_memory, coarsest_resolution
+
+NEARLY = 0.9
+"""Part of the resolution needed below which a study is refused; packers may scale given radii a little."""
+
+DRAWN = ("uniform", "gaussian", "lognormal")
+"""Distributions whose smallest radius depends on what is drawn."""
 
 HINTS = {"conduction.pipe_resistance": "engine = 'pipe' has method = 'chord' or 'uniform', the resistance of its pipes"}
 """What to say of keys that other commands have."""
@@ -88,8 +95,43 @@ class Study(StudyTable):
                 f"packing.periodic: found {self.packing.periodic!r}, engine = {word!r} takes a box with walls all "
                 "around or with none"
             )
+        self._check_grid(composite)
         if "pore_conductivity" in self.models.model_fields_set:
             raise ValueError("models.pore_conductivity: composite.matrix_conductivity says it, take it out")
+
+    def _check_grid(self, composite: CompositeTable) -> None:
+        """The grid goes with its engine, and with the particles where their size is known beforehand."""
+        word = self.conduction.engine
+        foreign = "nodes" if word == "voxel" else "resolution"
+        if foreign in composite.model_fields_set:
+            raise ValueError(f"composite.{foreign}: has no meaning with engine = {word!r}, take it out")
+        if word != "voxel":
+            return
+        try:
+            check_memory(self.packing.box, composite.resolution)
+        except InputError as error:
+            raise ValueError(f"composite.resolution: {error}") from None
+        radius = self._smallest_radius()
+        if radius is None:
+            return
+        needed = coarsest_resolution(self.packing.box, radius)
+        if composite.resolution < NEARLY * needed:
+            raise ValueError(
+                f"composite.resolution: found {composite.resolution}, too coarse for the smallest particle, of "
+                f"diameter {2.0 * radius:.6g}: allowed is at least {needed}"
+            )
+
+    def _smallest_radius(self) -> float | None:
+        """Least radius of the sweep where it does not depend on what is drawn, or None."""
+        packing = self.packing
+        radii = distribution(packing.radii)
+        if packing.count is None or packing.density is None:
+            return None if radii.scalable or radii.kind in DRAWN else radii.smallest
+        if radii.kind != "equal":
+            return None
+        dimension = len(packing.box)
+        measure = min(packing.density) * float(np.prod(packing.box)) / packing.count
+        return float((measure / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension))
 
     @property
     def variants(self) -> tuple[str, tuple[float, ...] | None]:

@@ -40,7 +40,11 @@ ENGINES = ("voxel", "lattice")
 @click.option("--particles", type=int, help="lattice: number of particles, about; 20000 by default.")
 @click.option("--seed", type=int, help="lattice: seed of its particles; 1 by default.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with inclusions and result.")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture of a section: voxels and heat flux (voxel).")
+@click.option(
+    "--plot",
+    type=click.Path(path_type=Path),
+    help="voxel: picture of voxels and heat flux; of spheres a section through the largest area of inclusions.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def homogenize_command(
     inclusions: Path,
@@ -84,22 +88,30 @@ def homogenize_command(
         if path is not None:
             check_place(path, inclusions)
     table = _read(inclusions, box, frame, boundary)
+    if table.wrapped:
+        words = (
+            "1 centre lay outside the box and was"
+            if table.wrapped == 1
+            else (f"{table.wrapped} centres lay outside the box and were")
+        )
+        click.echo(f"etc-engine: note: {words} wrapped into it", err=True)
     given = inclusion if table.conductivity is None else table.conductivity
+    if inclusion is not None and table.conductivity is not None:
+        click.echo(f"etc-engine: note: --inclusion is not used: {inclusions} has a column 'conductivity'", err=True)
     if given is None:
         raise InputError("the conductivity of the inclusions is missing: give --inclusion, or a column 'conductivity'")
     composite = Composite(table.packing, matrix, np.asarray(given))
-    if composite.overlapping:
-        click.echo(
-            f"etc-engine: warning: {composite.overlapping} pairs of inclusions overlap: their union counts once, "
-            "divided by the radical plane where their conductivities differ",
-            err=True,
-        )
+    if plot is not None and np.isinf(composite.inclusion).any():
+        raise InputError("--plot needs finite conductivities: leave it out, or give the inclusions a large one")
+    _warn_of_overlaps(composite)
     boundary = boundary or ("periodic" if all(table.packing.box.periodic) else "walls")
     if engine == "voxel":
         options = {name: value for name, value in fft.items() if value is not None and name != "plot"}
         result = _by_voxels(composite, boundary, options)
     else:
-        result = _by_lattice(composite, boundary, particles or 20_000, 1 if seed is None else seed)
+        result = _by_lattice(
+            composite, boundary, 20_000 if particles is None else particles, 1 if seed is None else seed
+        )
     record = _record(composite, engine, boundary, result)
     with ExitStack() as files:
         _write(files, output, table, composite, record)
@@ -110,6 +122,16 @@ def homogenize_command(
         print_json(record)
     else:
         _print_table(record)
+
+
+def _warn_of_overlaps(composite: Composite) -> None:
+    count = composite.overlapping
+    if count == 0:
+        return
+    who = "1 pair of inclusions overlaps: its" if count == 1 else f"{count} pairs of inclusions overlap: their"
+    divided = ", divided by the radical plane where their conductivities differ"
+    differ = bool((composite.inclusion != composite.inclusion[0]).any())
+    click.echo(f"etc-engine: warning: {who} union counts once{divided if differ else ''}", err=True)
 
 
 def _read(path: Path, box: str | None, frame: int | None, boundary: str | None) -> ParticleTable:
@@ -229,7 +251,7 @@ def _print_table(record: dict[str, Any]) -> None:
         if name == "conductivity_tensor":
             text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
         elif name == "conductivity_bounds":
-            text = " to ".join(f"{k:.8g}" for k in value)
+            text = f"{value[0]:.8g} (series) to {value[1]:.8g} (parallel)"
         else:
             text = f"{value:.8g}" if isinstance(value, float) else str(value)
         unit = " W/(m K)" if name.startswith("conductivity") else ""

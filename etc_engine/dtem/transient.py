@@ -24,7 +24,7 @@ from etc_engine.dtem.element import Elements
 from etc_engine.dtem.sides import ContactSides, check_arcs, contact_sides
 from etc_engine.dtem.steady import make_material, per_particle
 from etc_engine.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
-from etc_engine.dtem.wall_nodes import WallNodes, number_nodes
+from etc_engine.dtem.wall_nodes import FIRM, WallNodes, number_nodes
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import particle_values
 from etc_engine.solvers.marching import HeatSystem
@@ -263,8 +263,7 @@ def _heat_system(
     matrix = csr_matrix(elements_alone + diags_array(exchange))
     matrix.sort_indices()
     behind = elements_alone[nodes]
-    # film and elements of a plate are in series: the smaller conductance has the larger, more exact difference
-    by_film = exchange[nodes] <= elements_alone.diagonal()[nodes]
+    by_film = exchange[nodes] <= FIRM * elements_alone.diagonal()[nodes]
     links = np.asarray(fold.T @ system.rhs)  # conductances between unknowns and walls of given temperature
     own = lift.T @ elements.apply(lift)
 

@@ -12,6 +12,13 @@ from etc_engine.contacts import ContactNetwork
 from etc_engine.errors import InputError
 from etc_engine.walls import WALLS, Convective, FixedTemperature, HeatFlux, WallCondition
 
+FIRM = 1e4
+"""A film over so many times the conductance behind its plate tells the flow worse than what is behind does.
+
+Both carry the same flow. Over the film it balances exactly, but to film * T * 1e-16; behind the plate it balances to
+what an iterative solver left there.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class WallNodes:

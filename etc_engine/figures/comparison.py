@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 MEAN_FIELD = "contact_mean_field"
 
+MARGIN = 0.25
+"""Room above and below the simulated values of composites, over their range, for the model lines about them."""
+
 DECADES = 1.3
 """A logarithmic axis is used when the simulated values span more than this many decades."""
 
@@ -94,7 +97,7 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
         axes.set_title(title, fontsize=9)
         axes.set_xlabel(axis.label, fontsize=9)
     if not logarithmic:
-        grid[0, 0].set_ylim(bottom=0.0)
+        grid[0, 0].set_ylim(*_heights(comparison))
     for i, axes in enumerate(grid.flat):
         axes.set_visible(i < len(panels))
         axes.tick_params(labelbottom=i + columns >= len(panels))
@@ -102,12 +105,28 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
             axes.set_xlabel("")
     for axes in grid[:, 0]:
         axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
-    for row in range(rows):
-        last = min(len(panels), (row + 1) * columns) - 1
-        _label_models(grid.flat[last], panels[last][1], lines, axis)
+    # the models of a contrast are its own; others are the same in a whole row
+    own = bool(comparison.attrs["composite"]) and axis.dim != "contrast" and "contrast" in comparison.dims
+    for i, (axes, (_, part)) in enumerate(zip(grid.flat, panels, strict=False)):
+        if own or i == min(len(panels), (i // columns + 1) * columns) - 1:
+            _label_models(axes, part, lines, axis)
     _legend(figure, panels[0][1], axis)
     figure.supxlabel(_notes(comparison), fontsize=7.5, color="#555555")
     return figure
+
+
+def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
+    """Limits of the conductivity: from 0 for networks, about the simulated values for composites."""
+    if not comparison.attrs["composite"]:
+        return 0.0, None
+    names = ("conductivity_mean", "conductivity_ci_low", "conductivity_ci_high")
+    values = np.concatenate([comparison[name].values.ravel() for name in names])
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return 0.0, None
+    low, high = float(values.min()), float(values.max())
+    margin = MARGIN * (high - low if high > low else abs(high) or 1.0)
+    return low - margin, high + margin
 
 
 def _axis(comparison: xarray.Dataset) -> _Axis:
@@ -198,11 +217,13 @@ def _draw_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: 
 
 
 def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
-    """Names at the right ends of the model lines, moved apart where they would overlap."""
+    """Names at the right ends of the model lines, or where they leave the panel, moved apart."""
     ends = []
+    bottom, top = axes.get_ylim()
     for name, x, y in _lines(part, lines, axis):
-        i = int(np.flatnonzero(np.isfinite(y))[-1])
-        ends.append((name, float(x[i]), float(y[i])))
+        shown = np.flatnonzero((y >= bottom) & (y <= top))
+        if shown.size:
+            ends.append((name, float(x[shown[-1]]), float(y[shown[-1]])))
     if not ends:
         return
     axes.set_xlim(axes.get_xlim())  # the labels are placed in these limits

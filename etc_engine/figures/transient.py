@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 PANELS = 4
 """Particles are drawn at so many times."""
+BAND = "#dcdcdc"
+LOWEST = 1.6
+"""Least height of the packings' row in inches: the label of the colour bar stands upright beside it."""
 
 
 def save_transient(series: xarray.Dataset, path: Path | str) -> None:
@@ -41,8 +44,9 @@ def draw_transient(series: xarray.Dataset) -> Figure:
     width, height = series.attrs["box"]
     shown = pick_times(series["mean_temperature"].values, PANELS)
     panel = 11.0 / PANELS
-    figure = new_figure(11.0, min(panel * height / width, 6.0) + 3.6)
-    parts: Any = figure.subfigures(2, 1, height_ratios=[min(panel * height / width, 6.0) + 0.5, 3.1])
+    row = min(max(panel * height / width, LOWEST), 6.0)
+    figure = new_figure(11.0, row + 3.6)
+    parts: Any = figure.subfigures(2, 1, height_ratios=[row + 0.5, 3.1])
     _draw_packings(parts[0], series, shown)
     flows, means = parts[1].subplots(1, 2)
     time = series["time"].values
@@ -58,10 +62,19 @@ def draw_transient(series: xarray.Dataset) -> Figure:
     flows.axhline(0.0, color=INK, linewidth=0.6)
     flows.set(xlabel="time [s]", ylabel="heat flow into the particles [W/m]")
     temperature = series["temperature"].values
-    means.fill_between(time, temperature.min(axis=1), temperature.max(axis=1), color="#dcdcdc", label="all particles")
+    means.fill_between(
+        time,
+        temperature.min(axis=1),
+        temperature.max(axis=1),
+        facecolor=BAND,
+        edgecolor="0.55",
+        linewidth=0.8,
+        label="all particles",
+    )
     means.plot(time, series["mean_temperature"].values, color=COLOURS[0], label="mean, by heat capacity")
     means.plot(time[shown], series["mean_temperature"].values[shown], "o", color=COLOURS[0], markersize=4)
-    means.legend(frameon=False, fontsize=9)
+    # above the axes: on the band its swatch and its words would be lost
+    means.legend(frameon=False, fontsize=9, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
     means.set(xlabel="time [s]", ylabel="temperature [K]")
     for axes in (flows, means):
         style(axes)

@@ -50,6 +50,8 @@ def draw_section(section: Section, caption: str = "") -> Figure:
         axes.set_xlabel("x [m]", fontsize=9)
         axes.tick_params(labelsize=8)
     left.set_ylabel("y [m]", fontsize=9)
+    if section.height is not None:
+        caption = f"section at z = {section.height:.4g} m" + (f", {caption}" if caption else "")
     if caption:
         figure.suptitle(caption, fontsize=10)
     return figure

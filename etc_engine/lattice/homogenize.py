@@ -109,6 +109,10 @@ def homogenize_lattice(
     if boundary is None:
         boundary = "periodic" if all(composite.inclusions.box.periodic) else "walls"
     _refuse(composite, particles, boundary, transmission)
+    if not isinstance(tolerance, (int, float, np.number)) or not 0.0 < tolerance < 1.0:
+        raise InputError(f"the tolerance must lie between 0 and 1, found {tolerance!r}")
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"rng is a numpy.random.Generator, found {type(rng).__name__}")
 
     def conduct(count: int) -> _Conducted:
         return _conduct(composite, rng, count, boundary, transmission, interface_resistance, tolerance)
@@ -273,8 +277,8 @@ def _refuse(composite: Composite, particles: int, boundary: str, transmission: s
             f"the particle lattice is three-dimensional, found inclusions in {composite.dimension} dimensions: "
             "use the engine voxel"
         )
-    if particles < FEWEST:
-        raise InputError(f"a lattice needs at least {FEWEST} particles, found {particles}")
+    if not isinstance(particles, (int, np.integer)) or particles < FEWEST:
+        raise InputError(f"a lattice needs a whole number of at least {FEWEST} particles, found {particles!r}")
     if boundary not in BOUNDARIES:
         raise InputError(f"unknown boundary {boundary!r}: expected one of {', '.join(BOUNDARIES)}")
     if transmission not in TRANSMISSIONS:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, Tag, ValidationError, model_validator
 
-from etc_engine.errors import InputError, StudyError
+from etc_engine.errors import ConvergenceError, InputError, StudyError
 from etc_engine.meshless.contact_heating import ContactArc, heat_disk_through_arcs
 from etc_engine.meshless.discretization import Discretization
 from etc_engine.meshless.domain import Disk
@@ -30,6 +30,7 @@ from etc_engine.schema import (
     Word,
     first_problem,
 )
+from etc_engine.solvers.overflow import representable_numbers
 
 if TYPE_CHECKING:
     import xarray
@@ -188,6 +189,7 @@ def parse_study(content: Mapping[str, Any]) -> MeshlessStudy:
         raise StudyError(first_problem(error, MeshlessStudy)) from None
 
 
+@representable_numbers()
 def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
     """Solve a study of kind "meshless".
 
@@ -212,8 +214,13 @@ def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
     0.84836
     """
     study = parse_study(content)
-    if study.contact:
-        return _run_contacts(study).assign_attrs(study=study.name)
+    result = _run_contacts(study) if study.contact else _run_body(study)
+    if not np.isfinite(result.temperature.values).all():
+        raise ConvergenceError("the temperatures are no longer finite: check the values of the study")
+    return result.assign_attrs(study=study.name)
+
+
+def _run_body(study: MeshlessStudy) -> xarray.Dataset:
     problem = HeatProblem(
         vertices=None if study.body.vertices is None else np.array(study.body.vertices),
         disk=_disk(study.body.disk),
@@ -224,7 +231,7 @@ def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
         boundary=[_condition(edge) for edge in study.boundary],
     )
     solver = study.solver
-    result = solve_transient(
+    return solve_transient(
         problem,
         study.output.times,
         _points(study, problem),
@@ -233,7 +240,6 @@ def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
         steps=solver.steps,
         discretization=_discretization(solver),
     )
-    return result.assign_attrs(study=study.name)
 
 
 def _run_contacts(study: MeshlessStudy) -> xarray.Dataset:

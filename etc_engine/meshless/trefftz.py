@@ -6,12 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ive
 
+from etc_engine.errors import ConvergenceError
+
 Array = NDArray[np.float64]
 Field = NDArray
 
 #: ln |I_n(lambda)| below which the ratio I_n(lambda r)/I_n(lambda) is taken from its power series.
 UNDERFLOW = -300.0
 SERIES_TERMS = 60
+#: Largest |lambda|: the body is that many diffusion lengths of a step wide, far beyond what nodes resolve.
+STEEPEST = 1e6
 
 
 def trefftz_functions(points: Array, lam: complex, count: int) -> tuple[Field, Field, Field]:
@@ -92,6 +96,11 @@ def _hypergeometric(order: int, z: Field) -> Field:
 
 def _order_ratios(highest: int, lam: complex) -> Field:
     """I_{n+1}(lambda)/I_n(lambda) for n = 0 .. highest - 1, by the stable backward recurrence."""
+    if not abs(lam) <= STEEPEST:
+        raise ConvergenceError(
+            f"heat goes {1.0 / abs(lam):.1e} of the body's radius in a step, too short a way to resolve (least "
+            f"{1.0 / STEEPEST:.0e}): check conductivity, heat capacity and times"
+        )
     extra = highest + 20 + int(2.0 * abs(lam))
     ratio: complex = 0.0
     ratios = np.empty(extra, dtype=complex if isinstance(lam, complex) else float)

@@ -56,7 +56,8 @@ def read_dump(path: Path | str, frame: int = -1) -> ParticleTable:
     path = Path(path)
     frames = list(_frames(path))
     if not -len(frames) <= frame < len(frames):
-        raise InputError(f"{path} holds {len(frames)} frames, numbered from 0: there is no frame {frame}")
+        held = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
+        raise InputError(f"{path} holds {held}, numbered from 0: there is no frame {frame}")
     return _particles(path, frames[frame])
 
 

@@ -26,11 +26,14 @@ class ParticleTable:
         Conductivity of each particle, where the file gives it.
     ids : ndarray of int64, shape (n,), or None
         Number by which the file names each particle, where it does.
+    wrapped : int
+        Centres that lay outside the box along a periodic axis and were wrapped into it; only counted for CSV.
     """
 
     packing: ParticlePacking
     conductivity: NDArray[np.float64] | None = None
     ids: NDArray[np.int64] | None = None
+    wrapped: int = 0
 
 
 def read_csv(path: Path | str, box: Box) -> ParticleTable:
@@ -65,7 +68,9 @@ def read_csv(path: Path | str, box: Box) -> ParticleTable:
         raise InputError(f"{path} holds no particles, only a header")
     columns = dict(zip(names, values.T, strict=True))
     centers = np.stack([columns[axis] for axis in AXES[: box.dimension]], axis=1)
-    return ParticleTable(ParticlePacking(centers, columns["radius"], box), columns.get("conductivity"))
+    packing = ParticlePacking(centers, columns["radius"], box)
+    wrapped = int(((centers < 0.0) | (centers > np.asarray(box.lengths))).any(axis=1).sum())
+    return ParticleTable(packing, columns.get("conductivity"), wrapped=wrapped)
 
 
 def write_csv(path: Path | str, table: ParticleTable) -> None:

@@ -19,6 +19,7 @@ from scipy.sparse import csr_matrix
 
 from etc_engine.contacts import ContactNetwork
 from etc_engine.dtem.storage import stored_areas
+from etc_engine.dtem.wall_nodes import FIRM
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import particle_values
 from etc_engine.pipe.conductances import PIPE_RESISTANCES, pipe_conductances
@@ -202,8 +203,7 @@ def _heat_system(
     totals = np.asarray(links.sum(axis=0)).ravel()
     joined = csr_matrix(-matrix[n:, :n])
     joints = np.asarray(joined.sum(axis=1)).ravel()
-    # film and contacts of a plate are in series: the smaller conductance has the larger, more exact difference
-    by_film = films <= joints
+    by_film = films <= FIRM * joints
 
     def given(t: float) -> NDArray[np.float64]:
         return np.array([c.temperature(t) if isinstance(c, FixedTemperature) else 0.0 for c in conditions])

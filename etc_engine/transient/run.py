@@ -13,12 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.batch.stop import Stopped, StopRequest
 from etc_engine.box import Box, parse_periodic
 from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
-from etc_engine.errors import StudyError
+from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
 from etc_engine.packing.dumps import read_trajectory
 from etc_engine.packing.formats import format_to_read, read_particles
 from etc_engine.packing.trajectory import Trajectory
 from etc_engine.solvers.marching import MarchState, march
+from etc_engine.solvers.overflow import representable_numbers
 from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
 from etc_engine.transient.states import State, claimed_states, write_state
 from etc_engine.transient.study import Gradient, NetworkStudy, plain, refuse_endless
@@ -75,6 +76,7 @@ class _Course:
     trajectory: Trajectory | None = None
 
 
+@representable_numbers()
 def run_transient(
     study: NetworkStudy,
     folder: Path,
@@ -108,7 +110,7 @@ def run_transient(
     course = (_still if study.motion is None else _moving)(study, folder, progress)
     made = Transient(study, course.network, course.system, [], course.times, course.trajectory)
     if output is None:
-        return replace(made, states=list(course.march(None)))
+        return replace(made, states=[_finite(state) for state in course.march(None)])
     with (
         claimed_states(output, _digest(study, course), course.kind, resume=resume) as (place, found),
         StopRequest() as stop,
@@ -118,11 +120,18 @@ def run_transient(
             marching = course.march(states[-1] if states else None)
             try:
                 while len(states) < course.times.size:
-                    states.append(stop.run(lambda: next(marching)))
+                    states.append(_finite(stop.run(lambda: next(marching))))
                     write_state(place, len(states) - 1, states[-1])
             except Stopped:
                 return replace(made, states=states, resumed=resumed, stopped=stop.reason)
         return replace(made, states=states, resumed=resumed)
+
+
+def _finite(state: State) -> State:
+    """The state, refused if a heat of it is beyond all numbers."""
+    if not np.isfinite(state.imbalance):
+        raise ConvergenceError(f"the heat is no longer finite at t = {state.time:g} s: check the values of the study")
+    return state
 
 
 def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:

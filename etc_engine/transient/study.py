@@ -36,6 +36,7 @@ from etc_engine.solvers.marching import SCHEMES
 from etc_engine.transient.systems import SYSTEMS
 from etc_engine.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable, WallCondition
 
+SOME = Field(min_length=1)
 A_VALUE = f"{NUMBER}, or a table {{ times = [...], values = [...] }}"
 
 
@@ -163,11 +164,11 @@ class Material(StudyTable):
     """``[material]``: storage and initial temperatures; a number, or one for each particle."""
 
     heat_capacity: Annotated[
-        Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], Field(min_length=1), Tag(AS_LIST)], WRITTEN
+        Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], SOME, Tag(AS_LIST)], WRITTEN
     ] = Field(description=f"{POSITIVE}, or a list of such, one for each particle: rho c [J/(m3 K)]")
     initial: Annotated[
         Annotated[Number, Tag(AS_NUMBER)]
-        | Annotated[list[Number], Field(min_length=1), Tag(AS_LIST)]
+        | Annotated[list[Number], SOME, Tag(AS_LIST)]
         | Annotated[Gradient, Tag(AS_TABLE)],
         WRITTEN,
     ] = Field(

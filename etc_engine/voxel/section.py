@@ -16,7 +16,7 @@ from etc_engine.voxel.voxelization import check_resolution, voxelize
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Fields in the plane z = middle (of disks: everywhere), under a unit mean gradient along x.
+    """Fields in a plane of constant z (of disks: everywhere), under a unit mean gradient along x.
 
     Parameters
     ----------
@@ -26,11 +26,14 @@ class Section:
         Volume fraction of the inclusions.
     flux : ndarray, shape (n1, n2) [W/m2]
         Magnitude of the heat flux.
+    height : float, optional [m]
+        The plane's z; none of disks.
     """
 
     extent: tuple[float, float]
     fractions: NDArray[np.float64]
     flux: NDArray[np.float64]
+    height: float | None = None
 
 
 def solve_section(
@@ -43,7 +46,7 @@ def solve_section(
     voxels: str = "laminate",
     threads: int = 1,
 ) -> Section:
-    """Heat flux in a section of a composite.
+    """Heat flux in a section of a composite, of spheres where the inclusions fill the largest area.
 
     Parameters
     ----------
@@ -84,8 +87,9 @@ def solve_section(
     )
     flux = np.sqrt((image.conductivity.apply(np.ascontiguousarray(solution.gradients[0])) ** 2).sum(axis=0))
     if composite.dimension == 3:
-        middle = flux.shape[2] // 2
-        return Section((lengths[0], lengths[1]), image.fractions[:, :, middle], flux[:, :, middle])
+        layer = int(np.argmax(image.fractions.sum(axis=(0, 1)).round(9)))  # of layers alike the first
+        height = (layer + 0.5) * lengths[2] / flux.shape[2]
+        return Section((lengths[0], lengths[1]), image.fractions[:, :, layer], flux[:, :, layer], height)
     return Section((lengths[0], lengths[1]), image.fractions, flux)
 
 

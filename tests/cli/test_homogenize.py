@@ -63,7 +63,11 @@ def test_disks_with_a_column_of_conductivities(etc_engine, table):
     path = table("0.3,0.3,0.2,5", "0.7,0.7,0.15,0.2", header="x,y,radius,conductivity")
     common = ("homogenize", path, "--box", "1,1", "--matrix", "1")
     own = json.loads(etc_engine(*common, "--json").stdout)
-    given = json.loads(etc_engine(*common, "--inclusion", "77", "--json").stdout)
+    both = etc_engine(*common, "--inclusion", "77", "--json")
+    given = json.loads(both.stdout)
+    assert both.stderr.splitlines() == [
+        f"etc-engine: note: --inclusion is not used: {path} has a column 'conductivity'"
+    ]
     assert own["conductivity_tensor"] == given["conductivity_tensor"]
     assert "conductivity_bounds" not in own
     (kxx, kxy), (kyx, _) = own["conductivity_tensor"]
@@ -111,7 +115,10 @@ def test_overlapping_inclusions_are_counted_once_with_a_warning(etc_engine, tabl
     lens = 2.0 * 0.04 * np.arccos(0.5) - 0.1 * np.sqrt(4 * 0.04 - 0.04)
     assert record["volume_fraction"] == pytest.approx(2 * np.pi * 0.04 - lens, abs=1e-12)
     assert record["overlaps"] == 1
-    assert "1 pairs of inclusions overlap: their union counts once" in done.stderr
+    assert "1 pair of inclusions overlaps: its union counts once\n" in done.stderr
+    path = table("0.4,0.5,0.2,3", "0.6,0.5,0.2,4", header="x,y,radius,conductivity")
+    done = etc_engine("homogenize", path, "--box", "1,1", "--matrix", 1)
+    assert "divided by the radical plane where their conductivities differ" in done.stderr
 
 
 def test_insulators_and_perfect_conductors_are_solved_by_cg_and_refused_by_eyre_milton(etc_engine, table):
@@ -157,6 +164,12 @@ BAD = [
     (("--inclusion", 2, "--box", "1,-1,1"), "positive"),
     (("--inclusion", 2, "--frame", 0), "--frame goes with a dump"),
     (("--inclusion", 2, "--plot", "p.bmp"), "a picture is written as"),
+    (("--inclusion", 2, "--resolution", 0), "the resolution is a whole number of at least 1, found 0"),
+    (("--inclusion", 2, "--resolution", 1000000), "needs about 1.68e+11 GB of memory"),
+    (("--inclusion", 1e300, "--matrix", 1e-300), "within a factor of 1e+15"),
+    (("--inclusion", 1e20), "give 0 or inf"),
+    (("--inclusion", 2, "--engine", "lattice", "--particles", 0), "at least 50 particles, found 0"),
+    (("--inclusion", "inf", "--plot", "p.png"), "--plot needs finite conductivities"),
     (("--inclusion", 2, "-o", "/nowhere/out.nc"), "cannot write"),
 ]
 
@@ -192,3 +205,12 @@ def test_perfect_conductors_that_join_across_the_cell_are_refused(etc_engine, ta
     done = etc_engine("homogenize", path, "--box", "1,1", "--matrix", 1, "--inclusion", "inf")
     assert done.returncode == 2
     assert "join across the cell along x" in done.stderr.splitlines()[-1]
+
+
+def test_centres_outside_the_box_are_wrapped_with_a_note(etc_engine, table):
+    path = table("1.4,0.5,0.2", "0.8,-0.1,0.1", header="x,y,radius")
+    done = etc_engine("homogenize", path, "--box", "1,1", "--matrix", 1, "--inclusion", 3)
+    assert done.stderr.splitlines() == ["etc-engine: note: 2 centres lay outside the box and were wrapped into it"]
+    bounds = next(line for line in done.stdout.splitlines() if line.startswith("conductivity bounds"))
+    assert "(series) to" in bounds
+    assert bounds.endswith("(parallel) W/(m K)")

@@ -8,8 +8,9 @@ import pytest
 from etc_engine.batch.dataset import open_dataset
 from etc_engine.batch.study import Study, parse_study
 from etc_engine.box import Box
-from etc_engine.comparison import evaluate_models
+from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.errors import StudyError
+from etc_engine.figures import draw_comparison
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import CompositeSpec, ConductionSpec, ContactSpec, RealizationSpec, Status, realize
 from etc_engine.service.curve import curve_of
@@ -63,6 +64,18 @@ SPEC = RealizationSpec(
         ("tolerance", "conductivity = 1.0\ntolerance", "composite.contrast gives that of the particles"),
         ("[statistics]", '[contacts]\nrule = "bonded"\ncontact_angle = 5.0\n[statistics]', "contacts: has no meaning"),
         ("[statistics]", "[models]\npore_conductivity = 0.1\n[statistics]", "composite.matrix_conductivity says it"),
+        ("resolution = 32", "resolution = 32\nnodes = 900", "composite.nodes: has no meaning with engine = 'voxel'"),
+        ("resolution = 32", "resolution = 100000", "composite.resolution: .* GB of memory"),
+        (
+            "resolution = 32",
+            "resolution = 24",
+            "found 24, too coarse for the smallest particle, of diameter 0.145673: allowed is at least 28",
+        ),
+        (
+            'radii = "equal"\ncount = 12',
+            'radii = "bidisperse:0.02:0.1:0.5"',
+            "too coarse for the smallest particle, of diameter 0.04: allowed is at least 100",
+        ),
         ('engine = "voxel"', 'engine = "lattice"', "engine 'lattice' works in 3D"),
         ('engine = "voxel"', 'engine = "voxel"\nmethod = "chord"', "allowed with voxel: laminate, binary"),
     ],
@@ -71,6 +84,15 @@ def test_what_a_composite_study_may_not_say(old, new, words):
     assert old in STUDY
     with pytest.raises(StudyError, match=words):
         parse_study(STUDY.replace(old, new))
+
+
+def test_resolution_has_no_meaning_with_the_lattice():
+    space = (
+        STUDY.replace("box = [1.0, 1.0]", "box = [1.0, 1.0, 1.0]").replace('"xy"', '"xyz"').replace("voxel", "lattice")
+    )
+    with pytest.raises(StudyError, match=r"composite\.resolution: has no meaning with engine = 'lattice'"):
+        parse_study(space)
+    assert parse_study(space.replace("resolution = 32", "nodes = 900")).composite.nodes == 900
 
 
 def test_contrasts_are_the_second_axis_and_the_default_method_is_the_engines():
@@ -123,6 +145,11 @@ def test_a_sweep_compares_each_contrast_with_models_of_its_own(etc_engine, tmp_p
     maxwell = comparison.model_conductivity.sel(model="maxwell", density=0.2)
     beta = (np.array([2.0, 10.0]) - 1.0) / (np.array([2.0, 10.0]) + 1.0)
     np.testing.assert_allclose(maxwell, 0.5 * (1.0 + 0.2 * beta) / (1.0 - 0.2 * beta), rtol=1e-5)
+    panels = draw_comparison(comparison, model_lines(comparison)).axes
+    assert [panel.get_title() for panel in panels] == ["contrast 2", "contrast 10"]
+    for panel in panels:  # each names the lines of its own contrast, about the data
+        assert "Maxwell" in {text.get_text() for text in panel.texts}
+        assert 0.3 < panel.get_ylim()[0] < float(comparison.conductivity_mean.min())
     curve = curve_of(data)
     assert [series["contrast"] for series in curve["series"]] == [2.0, 10.0]
     lines = {model["name"]: model["curves"] for model in curve["models"]}

@@ -194,6 +194,13 @@ def test_voxels_make_layers_that_conduct_as_exactly_as_they_are_drawn():
         (lambda: spheres(CENTRE, 0.3, -1.0), "must not be negative"),
         (lambda: fitted_seeds(spheres(CENTRE, 0.01), 500, rng()), "too small for 500 lattice particles"),
         (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), particles=3), "at least 50 particles, found 3"),
+        (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), particles=5000.5), "at least 50 .* found 5000.5"),
+        (
+            lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), particles="9"),
+            "at least 50 particles, found '9'",
+        ),
+        (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), tolerance=0), "between 0 and 1, found 0"),
+        (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=7), "rng is a numpy.random.Generator, found int"),
         (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), boundary="open"), "unknown boundary 'open'"),
         (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), transmission="x"), "unknown transmission 'x'"),
         (

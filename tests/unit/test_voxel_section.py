@@ -69,6 +69,15 @@ def test_the_picture_shows_inclusions_and_flux():
     assert png(figure)[:4] == b"\x89PNG"
 
 
+def test_spheres_are_cut_where_they_fill_the_largest_area():
+    box = Box((1.0, 1.0, 2.0), (True,) * 3)
+    pair = ParticlePacking([[0.5, 0.5, 0.42], [0.5, 0.5, 1.4]], [0.35, 0.2], box)
+    section = solve_section(Composite(pair, 1.0, np.array(4.0)), resolution=16)
+    assert section.height == pytest.approx(0.42, abs=0.5 / 16)
+    assert section.fractions.mean() == pytest.approx(np.pi * 0.35**2, abs=0.01)
+    assert draw_section(section, "k").get_suptitle() == f"section at z = {section.height:.4g} m, k"
+
+
 def test_spheres_are_cut_in_the_middle():
     box = Box((1.0, 1.0, 1.0), (True,) * 3)
     sphere = Composite(ParticlePacking([[0.5, 0.5, 0.5]], [0.35], box), 1.0, np.array(4.0))
