@@ -65,7 +65,7 @@ def apply(text: str, limits: Limits) -> Application:
     --------
     >>> apply('schema = 1', Limits())
     Traceback (most recent call last):
-    etc_engine.errors.StudyError: study: name: missing, expected a name (and 3 more problems)
+    etc_engine.errors.StudyError: study: name: missing, expected a name ... (and 3 more problems)
     """
     try:
         study = parse_study(text, SOURCE)

@@ -106,8 +106,8 @@ def wait(
             found = status(server, study)
         except OutputError as error:
             if time.monotonic() - answered > patience:
-                again = f"the study goes on; ask again with: etc-engine fetch {study}"
-                raise OutputError(f"{error} (asked for {patience:g} s) {again}") from None
+                again = f"the study goes on; ask again with: etc-engine fetch {study} -o result.nc"
+                raise OutputError(f"{error} No answer for {patience:g} s; {again}") from None
         else:
             answered = time.monotonic()
             if tell is not None:

@@ -127,7 +127,7 @@ def test_the_form_follows_the_engine(slow, browser):
     browser.write(written("packing.density"), "0.2, 0.3")
     browser.write(written("composite.resolution"), "2")
     assert "at least 4" in problem_beside(browser, "composite.resolution")
-    browser.write(written("composite.resolution"), "32")
+    browser.write(written("composite.resolution"), "40")
     browser.write(written("models.names"), "maxwell")
     browser.until("return document.getElementById('size').innerText.startsWith('40 packings, 40 results')")
 
