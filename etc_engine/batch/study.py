@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
 
 from etc_engine.batch.study_tables import (
     CompositeTable,
@@ -47,10 +47,15 @@ def _printable(name: str) -> str:
     return name
 
 
+def _no_truth(value: object) -> object:
+    """``true`` equals 1 in Python, and is no number of a schema."""
+    return str(value).lower() if isinstance(value, bool) else value
+
+
 class Study(StudyTable):
     """A sweep: densities x contact angles (or contrasts) x methods x realizations of one kind of packing."""
 
-    schema_: Literal[1] = Field(alias="schema", description="1")
+    schema_: Annotated[Literal[1], BeforeValidator(_no_truth)] = Field(alias="schema", description="1")
     name: Annotated[Word, AfterValidator(_printable)] = Field(description="a name of 1 to 80 printable characters")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = Field(description="a whole number from 0 to 2**63 - 1")
     packing: PackingTable = Field(description="a table")
@@ -244,7 +249,9 @@ def parse_study(text: str, source: str = "study") -> Study:
     """
     try:
         values = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # beside its own errors: numbers of 5000 digits, lists 3000 deep
+    except RecursionError:
+        raise StudyError(f"{source}: is not valid TOML: it is nested too deeply") from None
+    except ValueError as error:  # beside its own errors: numbers of 5000 digits
         raise StudyError(f"{source}: is not valid TOML: {error}") from None
     try:
         return Study.model_validate(values)

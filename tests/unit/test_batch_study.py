@@ -170,3 +170,8 @@ def test_a_name_is_short_and_printable(name):
 def test_what_the_toml_reader_cannot_hold_is_refused(text):
     with pytest.raises(StudyError, match="is not valid TOML"):
         parse_study(text)
+
+
+def test_true_is_no_number_of_a_schema():
+    with pytest.raises(StudyError, match="schema: found 'true', allowed: 1"):
+        parse_study(STUDY.replace("schema = 1", "schema = true"))
