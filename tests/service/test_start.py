@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import shutil
 import signal
@@ -149,7 +150,7 @@ def test_a_full_disk_is_said_and_nothing_is_lost(small_disk, refused):
     filler.unlink()
     with Service(data, slow=True, environment={"ETC_TEST_SECONDS": "0.3"}) as service:
         study = client.submit(service.server, STUDY)["id"]
-        filler.write_bytes(b"\0" * small_disk_size(small_disk))
+        fill_up(filler)
         status, _, body = ask(f"{service.url}/api/studies", "POST", STUDY.replace("served", "second").encode())
         assert status == 507, body
         assert "disk of the service is full" in json.loads(body)["error"]
@@ -163,6 +164,16 @@ def test_a_full_disk_is_said_and_nothing_is_lost(small_disk, refused):
             ended = client.wait(service.server, study, interval=0.1)
         assert (ended["state"], ended["done"]) == ("done", 6), ended
         assert client.wait(service.server, client.submit(service.server, STUDY.replace("served", "second"))["id"])
+
+
+def fill_up(filler: Path) -> None:
+    """Write until nothing fits any more; the service writes beside it, so that no size is known beforehand."""
+    with filler.open("wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(b"\0" * 4096)
+        except OSError as error:
+            assert error.errno == errno.ENOSPC
 
 
 def small_disk_size(place: Path) -> int:
