@@ -129,13 +129,15 @@ class Composite:
         points = box.wrap(np.asarray(points, dtype=np.float64))
         # a cKDTree takes a length of 0 for an axis that does not repeat
         tree = cKDTree(points, boxsize=np.where(box.periodic, box.lengths, 0.0))
+        found = tree.query_ball_point(self.inclusions.centers, self.inclusions.radii)
+        rows = np.repeat(np.arange(self.inclusions.count), [len(inside) for inside in found])
+        inside = np.concatenate([np.asarray(part, dtype=np.int64) for part in found])
+        arms = box.minimum_image(points[inside] - self.inclusions.centers[rows])
+        power = np.einsum("mk,mk->m", arms, arms) - self.inclusions.radii[rows] ** 2
+        order = np.lexsort((rows, power, inside))
+        held, first = np.unique(inside[order], return_index=True)
         owner = np.full(points.shape[0], MATRIX, dtype=np.int64)
-        least = np.full(points.shape[0], np.inf)
-        for row, (center, radius) in enumerate(zip(self.inclusions.centers, self.inclusions.radii, strict=True)):
-            inside = np.asarray(tree.query_ball_point(center, radius), dtype=np.int64)
-            power = (box.minimum_image(points[inside] - center) ** 2).sum(axis=1) - radius**2
-            closer = power < least[inside]
-            owner[inside[closer]], least[inside[closer]] = row, power[closer]
+        owner[held] = rows[order][first]
         return owner
 
     def conductivity_at(self, points: ArrayLike) -> NDArray[np.float64]:
