@@ -1,0 +1,1 @@
+"""Closed-form resistance laws of single particles, by dimension."""
