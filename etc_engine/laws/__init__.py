@@ -1,1 +1,1 @@
-"""Closed-form resistance laws of single particles, by dimension."""
+"""Closed-form resistances of a particle between its contacts: arrays in, arrays out."""
