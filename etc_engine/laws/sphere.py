@@ -220,8 +220,8 @@ def mutual_resistance(
     cosine, alpha_i, alpha_j = np.broadcast_arrays(
         *(np.asarray(v, dtype=np.float64) for v in (cosine, alpha_i, alpha_j))
     )
-    flat = (np.ascontiguousarray(v).ravel() for v in (cosine, alpha_i, alpha_j))
-    return _mutual(*flat, method == "standard").reshape(cosine.shape)
+    a, b = alpha_i.ravel(), alpha_j.ravel()
+    return _mutual(cosine.ravel(), a, b, method == "standard").reshape(cosine.shape)
 
 
 def resistance_matrices(
