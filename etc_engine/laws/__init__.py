@@ -1,0 +1,1 @@
+"""Laws of the contact and of the gap between two particles."""
