@@ -1,1 +1,1 @@
-"""Laws of the contact and of the gap between two particles."""
+"""Closed-form resistances of a particle between its contacts: arrays in, arrays out."""
