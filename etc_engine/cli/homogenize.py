@@ -14,7 +14,7 @@ import click
 
 if TYPE_CHECKING:
     from etc_engine.medium.composite import Composite, Homogenized
-    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.table import ParticleTable
 
 ENGINES = ("voxel", "lattice")
 

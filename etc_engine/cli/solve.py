@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from etc_engine.engines.pipe.steady import PipeSolution
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.network import ContactNetwork
-    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.table import ParticleTable
 
     Result = EffectiveConductivity[SteadySolution] | EffectiveConductivity[PipeSolution]
 
