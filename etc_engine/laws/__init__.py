@@ -1,0 +1,1 @@
+"""Closed-form resistance laws: arrays in, arrays out."""
