@@ -1,1 +1,1 @@
-"""Closed-form resistance laws: arrays in, arrays out."""
+"""Closed-form resistances of a particle between its contacts: arrays in, arrays out."""
