@@ -18,8 +18,9 @@ This module tabulates two functions of two caps a <= b, with beta = sin(b/2) and
 **No series.** By Mehler's integral every cap has A_l = int_0^theta g(t) cos((l + 1/2) t) dt, and the cosines are
 complete: sum_{l >= 0} 2 A_l A'_l = pi int g g' dt. The rest, sum (1/l) A_l A'_l, is the mean of -ln s - ln(1+s):
 
-    F = 8/(pi beta) int_0^{pi/2} cos^2 u f du - 2 - <ln s> - <ln(1+s)>,    f^2 = (1 - p^2 sin^2 u)/(1 - p^2 beta^2 sin^2 u),
-    D = 2/beta int_0^{pi/2} cos u f du - 2 - <ln s> - <ln(1+s)>.
+    F = 8/(pi beta) int_0^{pi/2} cos^2 u f du - 2 - <ln s> - <ln(1+s)>,
+    D = 2/beta int_0^{pi/2} cos u f du - 2 - <ln s> - <ln(1+s)>,
+    f^2 = (1 - p^2 sin^2 u)/(1 - p^2 beta^2 sin^2 u).
 
 The mean of ln s over a circle is elementary, ln(cos(theta</2) sin(theta>/2)). What is left, beta (F + ln beta), is
 smooth in beta and in sqrt(1 - p): products of Chebyshev polynomials have it to 1e-6.
@@ -40,25 +41,6 @@ WIDEST = np.sqrt(0.5)
 Y_TERMS, BETA_TERMS = 18, 9
 """Chebyshev polynomials in sqrt(1 - p) and in beta."""
 
-# Isothermal contact disk on a ball cut there: beyond the closed form of the disk inside the full ball, a Chebyshev
-# series on 0 < a <= 60 degrees, fitted to spectral elements on the bipolar strip of the meridian plane (2e-11).
-_CUT = np.array(
-    [7.03245456e-03, 3.24016334e-03, 8.03374247e-04, 1.11209464e-04, 1.44098820e-05, 2.16568570e-06]
-    + [3.13996256e-07, 5.61054879e-08, 8.62409050e-09, 1.18984397e-09, 3.20067432e-10]
-)
-
-
-@njit(cache=True)
-def contact_disk(a: float) -> float:
-    """kappa R h of an isothermal contact disk of half-angle a on the sphere that is cut there, a <= 60 degrees."""
-    s = np.sin(a)
-    disk = (np.pi / (2.0 * s) - 2.0 * a / s + 2.0 - np.log(2.0 * s) + (0.5 * np.pi - a) / np.tan(a)) / (4.0 * np.pi)
-    x = 6.0 * a / np.pi - 1.0
-    after, last = 0.0, 0.0
-    for k in range(_CUT.size - 1, 0, -1):  # Clenshaw
-        after, last = _CUT[k] + 2.0 * x * after - last, after
-    return disk - a / np.cos(a) * (_CUT[0] + x * after - last)
-
 
 @lru_cache(maxsize=1)
 def coaxial_tables() -> NDArray[np.float64]:
@@ -78,7 +60,7 @@ def coaxial_tables() -> NDArray[np.float64]:
 
 
 def _scaled(p: float, beta: float, disk: bool) -> float:
-    """beta (F + ln beta), or with D, by Gauss quadrature: in u, over both caps, around the axis."""
+    """Sample of beta (F + ln beta), or with D, by Gauss quadrature: in u, over both caps, around the axis."""
     x, w = leggauss(48)
     u, wu = 0.25 * np.pi * (x + 1.0), 0.25 * np.pi * w
     f = np.sqrt((1.0 - (p * np.sin(u)) ** 2) / (1.0 - (p * beta * np.sin(u)) ** 2))

@@ -14,7 +14,7 @@ M_kl/(4 pi kappa R) (module `coaxial`). If both faces are isothermal,
 .. math:: (M_1/4\pi\kappa_1R_1 + M_2/4\pi\kappa_2R_2 + \mathrm{diag}(1/G))\,q = e, \qquad w = q/\textstyle\sum q,
 
 and the shape w of the flux condenses the pair: constriction h_i = w.M_i w/(4 pi kappa_i R_i) of either side and
-resistance R_gap = sum w_k^2/G_k of the fluid between. Their sum is stationary in w.
+resistance R_gap = sum w_k^2/G_k + R_bond w_disk^2 between. Their sum is stationary in w.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.errors import InputError
-from etc_engine.laws.coaxial import Y_TERMS, beta_sums, coaxial_tables, contact_disk, y_sum
+from etc_engine.laws.coaxial import Y_TERMS, beta_sums, coaxial_tables, y_sum
+from etc_engine.laws.sphere import chord_resistance
 
 RINGS = 12
 """Rings between the innermost cap, or the contact disk, and the rim of the facet's disk."""
 MODES = RINGS + 2
 """Most flux modes: contact disk at equilibrium, cap, rings."""
-WIDEST_CONTACT = np.sin(np.pi / 3.0)
-"""Largest contact radius, in radii of the smaller sphere: the law of the contact disk ends at 60 degrees."""
+WIDEST_CONTACT = np.sin(np.radians(85.0))
+"""Largest contact radius, in radii of the smaller sphere."""
 
 # Gauss points per ring, in the logarithm of the gap.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -42,7 +43,7 @@ _EDGE = 1e-3
 # A gap below this part of the smaller radius is closed.
 _CLOSED = 1e-12
 # Rows of one pair in the kernels.
-_DISTANCE, _REACH, _CONTACT, _R1, _R2, _K1, _K2, _FLUID, _JUMP, _RADIATION = range(10)
+_DISTANCE, _REACH, _CONTACT, _R1, _R2, _K1, _K2, _FLUID, _JUMP, _RADIATION, _BOND = range(11)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,8 @@ class FacingSpheres:
         Temperature jump lengths, both surfaces together.
     radiation : ndarray, shape (m,) [W/(m2 K)]
         Radiative conductance per facing area.
+    bonds : ndarray, shape (m,) [K/W]
+        Contact resistance of the solid contact disk as a whole.
     """
 
     distances: NDArray[np.float64]
@@ -75,10 +78,11 @@ class FacingSpheres:
     fluid: NDArray[np.float64]
     jumps: NDArray[np.float64]
     radiation: NDArray[np.float64]
+    bonds: NDArray[np.float64]
 
     @property
     def rows(self) -> NDArray[np.float64]:
-        """All values, a row per pair, shape (m, 10)."""
+        """All values, a row per pair, shape (m, 11)."""
         return np.column_stack([getattr(self, field.name) for field in fields(self)])
 
 
@@ -91,7 +95,7 @@ class CondensedPairs:
     constrictions : ndarray, shape (m, 2) [K/W]
         h_1 and h_2: mean temperature of the facet's flux above that of the sphere, per heat flow, one facet alone.
     gaps : ndarray, shape (m,) [K/W]
-        R_gap, of the fluid.
+        R_gap, of the fluid and of the contact's own resistance.
     shapes : ndarray, shape (m, MODES)
         Part of the heat flow in each mode; `legendre_means` reads them.
     """
@@ -121,26 +125,30 @@ def condense_pairs(pairs: FacingSpheres) -> CondensedPairs:
 
     Notes
     -----
-    About 10 microseconds a pair, 6 if the two spheres are alike. Where spheres reach into each other beyond the contact
-    (Hertz: they flatten), the gap starts from zero at its edge. Without a contact, spheres that touch meet at one
-    temperature over a cap below the thermal boundary layer, 0.3 R k_f/kappa.
+    About 7 microseconds a pair of like spheres, 12 otherwise. Both ring spacings, all edges and every second one, go
+    into h and R_gap, which removes their leading error: against 120 rings R is off by less than 6e-4, mostly 1e-4.
+    Where spheres reach into each other beyond the contact (Hertz: they flatten), the gap starts from zero at its edge.
+    Without a contact, spheres that touch meet at one temperature over a cap below the thermal boundary layer,
+    0.3 R k_f/kappa.
 
     Examples
     --------
     Unit spheres of conductivity 100, 0.01 apart in a fluid of 1:
 
     >>> one = np.ones(1)
-    >>> pair = FacingSpheres(2.01 * one, 0.9 * one, 0 * one, np.ones((1, 2)), np.full((1, 2), 100.0), one, 0 * one, 0 * one)
+    >>> radii, none = np.ones((1, 2)), np.zeros(1)
+    >>> pair = FacingSpheres(2.01 * one, 0.9 * one, none, radii, 100.0 * radii, one, none, none, none)
     >>> found = condense_pairs(pair)
-    >>> bool(found.constrictions[0, 0] == found.constrictions[0, 1]), found.gaps.shape
-    (True, (1,))
+    >>> round(float(1.0 / (found.gaps + found.constrictions.sum(axis=1))[0]), 2)
+    11.63
     """
     rows = np.ascontiguousarray(pairs.rows, dtype=np.float64)
     _check(rows)
     count = rows.shape[0]
     resistances = np.empty((count, 3))
     shapes = np.zeros((count, MODES))
-    _condense(rows, coaxial_tables(), resistances, shapes)
+    disks = chord_resistance(np.arcsin(np.maximum(rows[:, _CONTACT, None], 1e-12) / rows[:, _R1 : _R2 + 1]))
+    _condense(rows, disks, coaxial_tables(), resistances, shapes)
     return CondensedPairs(resistances[:, :2].copy(), resistances[:, 2].copy(), shapes)
 
 
@@ -148,11 +156,17 @@ def _check(rows: NDArray[np.float64]) -> None:
     smaller = np.minimum(rows[:, _R1], rows[:, _R2])
     refused = (
         (~np.isfinite(rows).all(axis=1), "a value is not finite"),
-        ((rows[:, [_DISTANCE, _REACH, _R1, _R2, _K1, _K2]] <= 0.0).any(axis=1), "a length or conductivity is not positive"),
-        ((rows[:, [_CONTACT, _FLUID, _JUMP, _RADIATION]] < 0.0).any(axis=1), "a value is negative"),
+        (
+            (rows[:, [_DISTANCE, _REACH, _R1, _R2, _K1, _K2]] <= 0.0).any(axis=1),
+            "a length or conductivity is <= 0",
+        ),
+        ((rows[:, [_CONTACT, _FLUID, _JUMP, _RADIATION, _BOND]] < 0.0).any(axis=1), "a value is negative"),
         (rows[:, _REACH] > smaller * (1.0 + 1e-12), "the facet's disk is wider than the smaller sphere"),
-        (rows[:, _CONTACT] > WIDEST_CONTACT * smaller, "the contact disk spans more than a half-angle of 60 degrees"),
-        ((rows[:, [_CONTACT, _FLUID, _RADIATION]] == 0.0).all(axis=1), "neither contact nor fluid nor radiation between"),
+        (rows[:, _CONTACT] > WIDEST_CONTACT * smaller, "the contact disk spans more than a half-angle of 85 degrees"),
+        (
+            (rows[:, [_CONTACT, _FLUID, _RADIATION]] == 0.0).all(axis=1),
+            "no contact, fluid or radiation between",
+        ),
     )
     for bad, what in refused:
         if bad.any():
@@ -160,7 +174,7 @@ def _check(rows: NDArray[np.float64]) -> None:
             values = ", ".join(f"{v:.6g}" for v in rows[row])
             raise InputError(
                 f"pair {row} of facing spheres: {what} (distance, reach, contact, radii, conductivities, fluid, jump, "
-                f"radiation: {values})"
+                f"radiation, bond: {values})"
             )
 
 
@@ -202,10 +216,10 @@ def _gap(row: NDArray[np.float64], square: float) -> float:
 
 
 @njit(cache=True)
-def _tube_resistances(
+def _tube_conductances(
     row: NDArray[np.float64], edges: NDArray[np.float64], rings: int, out: NDArray[np.float64]
 ) -> None:
-    """1/G of the innermost cap and of every ring beyond it.
+    """G of the innermost cap and of every ring beyond it; infinite where both sides have one temperature.
 
     Integrated in the logarithm of the parabolic gap g_0 + (rho^2 - rho_0^2)/(2 R*), in which the integrand is flat.
     """
@@ -218,10 +232,10 @@ def _tube_resistances(
     for k in range(rings + 1):
         low = inner if k == 0 else edges[k - 1] ** 2
         high = edges[k] ** 2
-        out[k] = 0.0
+        out[k] = np.inf
         if k == 0 and (row[_CONTACT] > 0.0 or (floor <= closed and row[_FLUID] > 0.0)):
-            continue  # one temperature on both sides
-        whole = row[_RADIATION] * np.pi * (high - low)
+            continue
+        out[k] = row[_RADIATION] * np.pi * (high - low)
         if row[_FLUID] > 0.0:
             if k == 1 and floor <= closed and row[_CONTACT] > 0.0:
                 low = (edges[0] + _EDGE * (edges[1] - edges[0])) ** 2
@@ -231,28 +245,21 @@ def _tube_resistances(
                 parabola = np.exp(bottom + 0.5 * (top - bottom) * (_POINTS[q] + 1.0))
                 square = inner + 2.0 * curvature * (parabola - floor)
                 width = max(_gap(row, square) + lift, 0.0) + row[_JUMP]
-                whole += (
-                    0.5 * (top - bottom) * _WEIGHTS[q] * row[_FLUID] * 2.0 * np.pi * curvature * parabola / width
-                )
-        out[k] = 1.0 / whole
+                out[k] += (top - bottom) * _WEIGHTS[q] * row[_FLUID] * np.pi * curvature * parabola / width
 
 
 @njit(cache=True)
-def _self_matrix(
+def _cap_matrix(
     row: NDArray[np.float64],
     side: int,
     edges: NDArray[np.float64],
     rings: int,
     tables: NDArray[np.float64],
-    m: NDArray[np.float64],
-) -> int:
-    """M/(4 pi kappa R) between the modes of one sphere; returns their number.
-
-    Caps first; a ring's mean is (B_k cap_k - B_{k-1} cap_{k-1})/(B_k - B_{k-1}), B = sin^2(theta/2).
-    """
-    radius, scale = row[_R1 + side], 1.0 / (4.0 * np.pi * row[_K1 + side] * row[_R1 + side])
-    disk = 1 if row[_CONTACT] > 0.0 else 0
-    b = np.empty(MODES)
+    caps: NDArray[np.float64],
+    b: NDArray[np.float64],
+) -> None:
+    """F of all caps into ``caps[1:, 1:]``, D of the disk in them into row and column 0; ``b`` = sin^2(theta/2)."""
+    radius = row[_R1 + side]
     coefficients = np.empty(Y_TERMS)
     for k in range(rings + 1):
         sine = min(edges[k] / radius, 1.0)
@@ -261,65 +268,97 @@ def _self_matrix(
         beta = np.sqrt(b[k])
         beta_sums(tables[0], beta, coefficients)
         for l in range(k + 1):
-            m[disk + l, disk + k] = y_sum(coefficients, np.sqrt(b[l]) / beta, beta)
-        if disk:
+            caps[1 + l, 1 + k] = caps[1 + k, 1 + l] = y_sum(coefficients, np.sqrt(b[l]) / beta, beta)
+        if row[_CONTACT] > 0.0:
             beta_sums(tables[1], beta, coefficients)
-            m[0, disk + k] = y_sum(coefficients, np.sqrt(b[0]) / beta, beta)
+            caps[0, 1 + k] = caps[1 + k, 0] = y_sum(coefficients, np.sqrt(b[0]) / beta, beta)
+
+
+@njit(cache=True)
+def _ring_matrix(
+    caps: NDArray[np.float64],
+    b: NDArray[np.float64],
+    scheme: tuple[int, int, int],
+    scale: float,
+    disk_resistance: float,
+    m: NDArray[np.float64],
+) -> int:
+    """M/(4 pi kappa R) between the modes of one sphere; returns their number.
+
+    A ring's mean is (B_k cap_k - B_{k-1} cap_{k-1})/(B_k - B_{k-1}). ``scheme``: rings, stride over edges, disk or not.
+    """
+    rings, stride, disk = scheme
     size = rings + 1 + disk
     for k in range(size):
-        for l in range(k):
-            m[k, l] = m[l, k]
-    for k in range(rings, 0, -1):
         for l in range(size):
-            m[disk + k, l] = (b[k] * m[disk + k, l] - b[k - 1] * m[disk + k - 1, l]) / (b[k] - b[k - 1])
+            from_k, from_l = k - disk, l - disk
+            m[k, l] = caps[1 + from_k * stride if from_k >= 0 else 0, 1 + from_l * stride if from_l >= 0 else 0]
     for k in range(rings, 0, -1):
+        high, low = b[k * stride], b[(k - 1) * stride]
         for l in range(size):
-            m[l, disk + k] = (b[k] * m[l, disk + k] - b[k - 1] * m[l, disk + k - 1]) / (b[k] - b[k - 1])
+            m[disk + k, l] = (high * m[disk + k, l] - low * m[disk + k - 1, l]) / (high - low)
+    for k in range(rings, 0, -1):
+        high, low = b[k * stride], b[(k - 1) * stride]
+        for l in range(size):
+            m[l, disk + k] = (high * m[l, disk + k] - low * m[l, disk + k - 1]) / (high - low)
     if disk:
-        m[0, 0] = m[0, 1] = m[1, 0] = 4.0 * np.pi * contact_disk(np.arcsin(edges[0] / radius))
+        m[0, 0] = m[0, 1] = m[1, 0] = 4.0 * np.pi * disk_resistance
     m[:size, :size] *= scale
     return size
 
 
 @njit(cache=True)
-def _condense(
-    rows: NDArray[np.float64],
-    tables: NDArray[np.float64],
-    resistances: NDArray[np.float64],
-    shapes: NDArray[np.float64],
-) -> None:
-    """(h_1, h_2, R_gap) and the shape w of each pair: (H_1 + H_2 + diag(1/G)) q = e, w = q/sum q."""
-    own, other, factor = np.zeros((MODES, MODES)), np.zeros((MODES, MODES)), np.zeros((MODES, MODES))
+def _condense(rows, disks, tables, resistances, shapes):  # type: ignore[no-untyped-def]
+    """(h_1, h_2, R_gap) and the shape w of each pair: (H_1 + H_2 + diag(1/G)) q = e, w = q/sum q.
+
+    All rings and every second edge: the error goes with the square of the spacing, h = (4 h_all - h_half)/3.
+    """
+    caps, b = np.zeros((2, MODES, MODES)), np.empty((2, RINGS + 1))
+    m, factor = np.zeros((2, MODES, MODES)), np.zeros((MODES, MODES))
     edges, tubes, fluid, w = np.empty(RINGS + 1), np.empty(RINGS + 1), np.empty(MODES), np.empty(MODES)
     for p in range(rows.shape[0]):
         row = rows[p]
-        rings = ring_edges(row, edges)
-        _tube_resistances(row, edges, rings, tubes)
-        size = _self_matrix(row, 0, edges, rings, tables, own)
+        most = ring_edges(row, edges)
+        _tube_conductances(row, edges, most, tubes)
+        disk = 1 if row[_CONTACT] > 0.0 else 0
         alike = row[_R1] == row[_R2] and row[_K1] == row[_K2]
-        if not alike:
-            _self_matrix(row, 1, edges, rings, tables, other)
-        fluid[0] = 0.0
-        for k in range(rings + 1):
-            fluid[size - rings - 1 + k] = tubes[k]
-        for k in range(size):
-            for l in range(k + 1):
-                factor[k, l] = own[k, l] + (own[k, l] if alike else other[k, l])
-            factor[k, k] += fluid[k]
-        _solve_ones(factor, size, w)
-        total = w[:size].sum()
-        gap, constriction, opposite = 0.0, 0.0, 0.0
-        for k in range(size):
-            w[k] /= total
-            shapes[p, k] = w[k]
-        for k in range(size):
-            gap += fluid[k] * w[k] * w[k]
-            for l in range(size):
-                constriction += w[k] * own[k, l] * w[l]
-                opposite += w[k] * other[k, l] * w[l]
-        resistances[p, 0] = constriction
-        resistances[p, 1] = constriction if alike else opposite
-        resistances[p, 2] = gap
+        sides = 1 if alike else 2
+        for side in range(sides):
+            _cap_matrix(row, side, edges, most, tables, caps[side], b[side])
+        resistances[p] = 0.0
+        for stride in (1, 2):
+            rings = most // stride
+            size = rings + 1 + disk
+            share = 1.0 if most == 0 else (4.0 / 3.0 if stride == 1 else -1.0 / 3.0)
+            factor[:size, :size] = 0.0
+            for side in range(sides):
+                scale = 1.0 / (4.0 * np.pi * row[_K1 + side] * row[_R1 + side])
+                _ring_matrix(caps[side], b[side], (rings, stride, disk), scale, disks[p, side], m[side])
+                factor[:size, :size] += m[side, :size, :size] * (2.0 if alike else 1.0)
+            fluid[:2] = 0.0  # the modes of the disk have no tube
+            for k in range(rings + 1):
+                conductance = tubes[k * stride]
+                if k > 0 and stride == 2:
+                    conductance += tubes[k * stride - 1]
+                fluid[disk + k] = 1.0 / conductance
+                factor[disk + k, disk + k] += fluid[disk + k]
+            if disk:
+                factor[:2, :2] += row[_BOND]
+            _solve_ones(factor, size, w)
+            w[:size] /= w[:size].sum()
+            if stride == 1:
+                shapes[p, :size] = w[:size]
+            gap = row[_BOND] * (w[0] + w[1]) ** 2 if disk else 0.0
+            for k in range(size):
+                gap += fluid[k] * w[k] * w[k]
+                for l in range(size):
+                    for side in range(sides):
+                        resistances[p, side] += share * w[k] * m[side, k, l] * w[l]
+            resistances[p, 2] += share * gap
+            if most == 0:
+                break
+        if alike:
+            resistances[p, 1] = resistances[p, 0]
 
 
 @njit(cache=True)

@@ -3,14 +3,17 @@ r"""Spheres in a fluid as thermal elements: the facets of a sphere's Laguerre ce
 Every facet carries one flux shape, condensed from rings by `etc_engine.laws.rings`. With its Legendre means a_l,
 
 .. math:: H_{ij} = \frac{1}{4\pi\kappa R}\Bigl[\sum_{l=1}^{L}\frac{2l+1}{l}\,a^i_l a^j_l\,P_l(n_i\cdot n_j)\,
-   \mathrm{sinc}\frac{l}{L+1} + 3\frac{k_f}{\kappa}\,a^i_1 a^j_1\,n_i\cdot(S^{-1}-I)\,n_j\Bigr], \qquad
-   S = \sum_j n_j n_j^T\,\tfrac12(1-\cos^3\psi_j),
+   \mathrm{sinc}\frac{l}{L+1} + 3 f\,a^i_1 a^j_1\,n_i\cdot(S^{-1}-I)\,n_j\Bigr], \qquad
+   S = \sum_j n_j n_j^T\,\tfrac12(1-\cos^3\psi_j), \qquad f = \Bigl(\frac{2k_f}{k_f+\kappa}\Bigr)^{5/4},
 
 and H_ii = h_i, from the rings, plus the same second term. The sinc damps the ripple of the cut series. The second term
 mends l = 1: the caps of equal area overlap a little, or leave gaps, where the facets tile the sphere (then S = I).
-Without it k tends to a wrong value as kappa tends to k_f. The fluid's R_gap is shared by the two sides like the
-resistance of a contact. A *column* is the part of a facet beyond the sphere, or a facet too small for rings: a tube of
-fluid from centre to centre, whose node sees the mean temperature of the sphere (a zero row of H, its resistance aside).
+Without it k is 20 % too low at kappa = k_f; with f = 1 it is 10 % too high at kappa = 10 k_f. The exponent was chosen
+on body- and face-centred cubic arrays and one random packing, contrast 2 to 30.
+
+The fluid's R_gap is shared by the two sides like the resistance of a contact. A *column* is the part of a facet beyond
+the sphere, or a facet too small for rings: a tube of fluid from centre to centre. Its node sees the mean temperature of
+the sphere: a zero row of H, its resistance aside.
 """
 
 from __future__ import annotations
@@ -21,9 +24,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Elements, cholesky_inverse, condense, packed_starts
+from etc_engine.engines.dtem.element import Elements, condense, packed_starts
 from etc_engine.errors import GeometryError
-from etc_engine.laws.rings import CondensedPairs, FacingSpheres, condense_pairs, legendre_means
+from etc_engine.laws.rings import CondensedPairs, FacingSpheres, legendre_means
 
 TERMS = 100
 """Legendre terms between two facets, L."""
@@ -98,7 +101,7 @@ def facet_resistances(
     solids : (ndarray, ndarray), shapes (n,)
         Radii [m] and conductivities [W/(m K)].
     repair : ndarray, shape (n, 3, 3)
-        (k_f/kappa)(S^-1 - I).
+        f (S^-1 - I).
     """
     starts = packed_starts(sides.offsets)
     values = np.zeros(int(starts[-1]))
@@ -178,9 +181,7 @@ def _fill(sides, rows, condensed, scales, repair, weights, starts, values):  # t
                 values[starts[p] + j * n + i] = mend
 
 
-def facet_elements(
-    sides: FacetSides, starts: NDArray[np.int64], resistances: NDArray[np.float64]
-) -> Elements:
+def facet_elements(sides: FacetSides, starts: NDArray[np.int64], resistances: NDArray[np.float64]) -> Elements:
     """Conductivity matrices K_e = P (P^T H P)^-1 P^T of all spheres.
 
     Raises
