@@ -191,9 +191,9 @@ class ColumnReader:
             where = f"{self.place}, line {numbers[row]}" if numbers else self.place
             words = line.split(self.separator)
             if len(words) != self.layout.width:
-                found = "an empty line" if not line.strip() else f"{len(words)} values in {line.strip()[:60]!r}"
+                found = "an empty line" if not line.strip() else f"{len(words)} in {line.strip()[:60]!r}"
                 comma = "; write decimals with a point" if self.separator == ";" and "," in line else ""
-                return f"{where}: {self.layout.width} columns are named, found {found}{comma}"
+                return f"{where}: expected {self.layout.width} values, found {found}{comma}"
             for column, name in names.items():
                 try:
                     float(words[column])

@@ -170,7 +170,9 @@ def _lines(path: Path, stream: Iterable[bytes]) -> Iterator[str]:
         try:
             text = (line.removeprefix(BOM) if first else line).decode("utf-8")
         except UnicodeDecodeError as error:
-            raise InputError(f"{path} is not a text file in UTF-8: {error.reason} in {line[:40]!r}") from None
+            raise InputError(
+                f"{path} is not a format I know, and cannot be read as text: {error.reason} in {line[:40]!r}"
+            ) from None
         if "\x00" in text:
             raise InputError(f"{path} is not a table of text: it holds zero bytes")
         first = False

@@ -178,7 +178,7 @@ def read_particles(
     with seekable_copy(path) as place:
         kind = format_to_read(place)
         if chosen.frame is not None and not kind.has_frames:
-            raise InputError(f"{path} is a {kind.name} with one packing: leave the frame out")
+            raise InputError(f"{path} is a {kind.name}, which holds one packing: leave the frame out")
         return make_table(kind.rows(place, chosen), chosen)
 
 

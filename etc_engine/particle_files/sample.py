@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,8 @@ class Sample:
     Parameters
     ----------
     box : tuple of (low, high), optional
-        Faces of the box along each axis, in the coordinates of the file; they replace the file's.
+        Faces of the box along each axis, in the coordinates of the file; they replace the file's. A low face of
+        ``-inf`` makes the other number an edge length, from the file's low corner or from 0.
     periodic : str, optional
         Periodic axes as a word; it replaces the file's.
     crop : tuple of (low, high)
@@ -40,6 +41,8 @@ class Sample:
         Number of the frame from 0, or from the end if negative; the last one by default.
     radius_column : str, optional
         Name of the column of radii, where it has another one than ``radius``.
+    unknown_periodic : bool
+        Whether axes are periodic where neither the user nor the file says.
     """
 
     box: tuple[Range, ...] | None = None
@@ -48,6 +51,7 @@ class Sample:
     dimension: int | None = None
     frame: int | None = None
     radius_column: str | None = None
+    unknown_periodic: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +121,7 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
     bounds, periodic = _faces(rows, sample, dimension)
     whole = Box(tuple((bounds[:, 1] - bounds[:, 0]).tolist()), periodic)
     centers = rows.positions[:, :dimension] - bounds[:, 0]
-    outside = ((centers < 0.0) | (centers > np.asarray(whole.lengths))).any(axis=1)
+    outside = np.flatnonzero(((centers < 0.0) | (centers > np.asarray(whole.lengths))).any(axis=1))
     cropped = (False,) * (2 * dimension)
     keep = np.arange(len(centers))
     if sample.crop:
@@ -134,7 +138,7 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
     columns = {name: getattr(rows, name) for name in ("conductivity", "ids", "types", "temperature")}
     return ParticleTable(
         packing=ParticlePacking(centers, rows.radii[keep], box),
-        wrapped=int(outside[keep].sum()) if rows.bounds is None else 0,
+        wrapped=np.intersect1d(keep, outside).size if rows.bounds is None else 0,
         origin=tuple(bounds[:, 0].tolist()),
         printed=rows.printed,
         cropped=cropped,
@@ -184,8 +188,14 @@ def _dimension(rows: Rows, sample: Sample) -> tuple[int, tuple[str, ...]]:
     wanted = sample.dimension
     if wanted is not None and sample.box is not None and len(sample.box) != wanted:
         raise InputError(f"a box of {len(sample.box)} edges does not go with dimension {wanted}")
-    wanted = len(sample.box) if wanted is None and sample.box is not None else wanted
     heights = rows.positions.shape[1] == 3
+    if wanted is None and sample.box is not None:
+        wanted = len(sample.box)
+        if wanted == 2 and heights and rows.flat and np.abs(rows.positions[:, 2]).max() > _slack(rows):
+            raise InputError(
+                f"{rows.place} has heights (z = {rows.positions[0, 2]:g}): a 2D box needs x,y and radius alone; give "
+                "a 3D box, or --dimension 2 for disks"
+            )
     if wanted == 3 and not heights:
         raise InputError(f"{rows.place} has no heights (z), which spheres in a 3D box need: give a 2D box")
     if wanted == 2 and not rows.flat:
@@ -203,6 +213,10 @@ def _dimension(rows: Rows, sample: Sample) -> tuple[int, tuple[str, ...]]:
     return 3, ()
 
 
+def _slack(rows: Rows) -> float:
+    return FLAT * float(np.abs(rows.radii).max())
+
+
 def _flat_dimension(rows: Rows, slab: NDArray[np.float64]) -> tuple[int, tuple[str, ...]]:
     """Dimension of one layer in a 3D box: disks in the slab that LAMMPS keeps about z = 0 in two dimensions, else
     spheres.
@@ -210,7 +224,7 @@ def _flat_dimension(rows: Rows, slab: NDArray[np.float64]) -> tuple[int, tuple[s
     A two-dimensional run of LAMMPS has a box that is periodic along z and holds the plane z = 0, and every centre
     lies in it.
     """
-    slack = FLAT * float(np.abs(rows.radii).max())
+    slack = _slack(rows)
     planar = (
         bool(rows.periodic and rows.periodic[2])
         and slab[0] < -slack
@@ -232,7 +246,7 @@ def _faces(rows: Rows, sample: Sample, dimension: int) -> tuple[NDArray[np.float
     """Faces of the box, shape (d, 2), and its periodic axes."""
     if sample.box is None and rows.bounds is None:
         raise InputError(
-            f"{rows.place} has no box: give its edge lengths with --box, such as "
+            f"{rows.place} has no box, and --box is missing: give its edge lengths, such as "
             f"--box {','.join('1' * dimension)}, or its faces as low:high"
         )
     if sample.box is None:
@@ -240,13 +254,16 @@ def _faces(rows: Rows, sample: Sample, dimension: int) -> tuple[NDArray[np.float
         bounds = np.array(rows.bounds[:dimension])
     else:
         bounds = np.array(sample.box, dtype=np.float64) * rows.scale
-        for axis, (low, high) in enumerate(sample.box):
-            if not (isfinite(low) and isfinite(high) and low < high):
+        corner = np.zeros(dimension) if rows.bounds is None else rows.bounds[:dimension, 0]
+        lengths = bounds[:, 0] == -inf
+        bounds[lengths] = np.stack([corner, corner + bounds[:, 1]], axis=1)[lengths]
+        for axis, (low, high) in enumerate(bounds.tolist()):
+            if sample.box[axis][0] > -inf and not (isfinite(low) and isfinite(high) and low < high):
                 raise InputError(f"the box along {AXES[axis]} must go from low to high, found {low:g}:{high:g}")
     if sample.periodic is not None:
         return bounds, parse_periodic(sample.periodic, dimension)
     if rows.periodic is None or rows.bounds is None:
-        return bounds, (False,) * dimension
+        return bounds, (sample.unknown_periodic,) * dimension
     flags = []
     for axis in range(dimension):
         edge = rows.bounds[axis, 1] - rows.bounds[axis, 0]

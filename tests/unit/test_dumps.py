@@ -109,7 +109,7 @@ def test_round_trip_keeps_every_bit(tmp_path, dimension):
             "tilted .triclinic. box .xy = 0.2",
         ),
         ("2 0.75", "2 abc", "x is not a number: 'abc'"),
-        ("diameter vx", "diameter", "5 columns are named, found 6 values"),
+        ("diameter vx", "diameter", "expected 5 values, found 6"),
         ("ATOMS\n2", "ATOMS\n0", "holds no particles|malformed|expected"),
     ],
 )

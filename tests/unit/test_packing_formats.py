@@ -82,10 +82,10 @@ def test_box_and_frame_of_every_format(tmp_path):
     table = ParticleTable(ParticlePacking([[0.5, 0.5]], [0.1], Box((1.0, 1.0))))
     for ending in ("csv", "nc"):
         write_particles(tmp_path / f"a.{ending}", table)
-    with pytest.raises(InputError, match="has no box: give its edge lengths"):
+    with pytest.raises(InputError, match="--box is missing: give its edge lengths"):
         read_particles(tmp_path / "a.csv")
     assert read_particles(tmp_path / "a.nc", Box((2.0, 3.0))).packing.box == Box((2.0, 3.0))
-    with pytest.raises(InputError, match="netCDF file with one packing: leave the frame out"):
+    with pytest.raises(InputError, match="netCDF file, which holds one packing: leave the frame out"):
         read_particles(tmp_path / "a.nc", frame=0)
 
 
