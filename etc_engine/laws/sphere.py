@@ -258,7 +258,7 @@ def resistance_matrices(
     --------
     >>> h = resistance_matrices(np.array([0, 2]), np.array([[0, 0, 1.0], [0, 0, -1.0]]), np.array([0.1, 0.1]), "chord")
     >>> h.reshape(2, 2).round(4).tolist()
-    [[2.4975, -0.1347], [-0.1347, 2.4975]]
+    [[2.5461, -0.1344], [-0.1344, 2.5461]]
     """
     own = self_resistance(alpha, method)
     starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
