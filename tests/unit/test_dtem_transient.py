@@ -39,7 +39,7 @@ def one_disk(theta, alpha) -> ContactSides:
     n = theta.size
     arms = np.stack([np.cos(theta), np.sin(theta)], axis=1)
     return ContactSides(
-        np.array([0, n]), np.arange(n), arms, theta, alpha, np.zeros((0, 2), dtype=np.int64), np.arange(n)
+        np.array([0, n]), np.arange(n), arms, theta, alpha, np.zeros((0, 2), dtype=np.int64), np.arange(n), np.ones(1)
     )
 
 
