@@ -312,7 +312,7 @@ def resistance_matrices(
     --------
     >>> h = resistance_matrices(np.array([0, 2]), np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([0.1, 0.1]), "chord")
     >>> h.reshape(2, 2).round(4).tolist()
-    [[1.1609, 0.0005], [0.0005, 1.1609]]
+    [[1.1639, 0.0003], [0.0003, 1.1639]]
     """
     theta = np.arctan2(arms[:, 1], arms[:, 0])
     starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
