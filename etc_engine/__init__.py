@@ -19,59 +19,61 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from etc_engine.box import Box
     from etc_engine.comparison import evaluate_models
-    from etc_engine.composite import Composite
-    from etc_engine.contacts import ContactNetwork, bonded_contacts, overlap_contacts
-    from etc_engine.dtem.field import ParticleField, recover_field
-    from etc_engine.dtem.interior import temperatures_inside
-    from etc_engine.dtem.steady import solve_steady
-    from etc_engine.dtem.transient import transient_system
-    from etc_engine.effective import effective_conductivity, mean_field_conductivity
+    from etc_engine.engines.dtem.effective import effective_conductivity, mean_field_conductivity
+    from etc_engine.engines.dtem.field import ParticleField, recover_field
+    from etc_engine.engines.dtem.interior import temperatures_inside
+    from etc_engine.engines.dtem.steady import solve_steady
+    from etc_engine.engines.dtem.transient import transient_system
+    from etc_engine.engines.lattice.homogenize import homogenize_lattice
+    from etc_engine.engines.pipe.steady import pipe_conductivity
+    from etc_engine.engines.pipe.transient import pipe_transient
+    from etc_engine.engines.voxel.homogenize import homogenize_voxel
     from etc_engine.errors import EtcError
-    from etc_engine.lattice.homogenize import homogenize_lattice
+    from etc_engine.medium.backbone import find_backbone
+    from etc_engine.medium.composite import Composite
+    from etc_engine.medium.conductivity import EffectiveConductivity
+    from etc_engine.medium.network import ContactNetwork
+    from etc_engine.medium.rules import bonded_contacts, overlap_contacts
     from etc_engine.models.catalogue import evaluate as evaluate_model
-    from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii, solid_fraction
-    from etc_engine.packing.dumps import read_dump
-    from etc_engine.packing.files import read_csv
-    from etc_engine.percolation import find_backbone
-    from etc_engine.pipe.steady import pipe_conductivity
-    from etc_engine.pipe.transient import pipe_transient
+    from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
+    from etc_engine.particle_files.csv_files import read_csv
+    from etc_engine.particle_files.dumps import read_dump
     from etc_engine.realization import RealizationSpec, realize
     from etc_engine.solvers.marching import march
-    from etc_engine.tensor import EffectiveConductivity
-    from etc_engine.voxel.homogenize import homogenize_voxel
+    from etc_engine.structure.union import solid_fraction
 
 _HOMES = {
     "Box": "box",
-    "Composite": "composite",
-    "ContactNetwork": "contacts",
-    "EffectiveConductivity": "tensor",
+    "Composite": "medium.composite",
+    "ContactNetwork": "medium.network",
+    "EffectiveConductivity": "medium.conductivity",
     "EtcError": "errors",
     "PackingSpec": "packing",
-    "ParticleField": "dtem.field",
+    "ParticleField": "engines.dtem.field",
     "ParticlePacking": "packing",
     "RealizationSpec": "realization",
-    "bonded_contacts": "contacts",
-    "effective_conductivity": "effective",
+    "bonded_contacts": "medium.rules",
+    "effective_conductivity": "engines.dtem.effective",
     "evaluate_model": "models.catalogue:evaluate",
     "evaluate_models": "comparison",
-    "find_backbone": "percolation",
-    "homogenize_lattice": "lattice.homogenize",
-    "homogenize_voxel": "voxel.homogenize",
+    "find_backbone": "medium.backbone",
+    "homogenize_lattice": "engines.lattice.homogenize",
+    "homogenize_voxel": "engines.voxel.homogenize",
     "march": "solvers.marching",
-    "mean_field_conductivity": "effective",
-    "overlap_contacts": "contacts",
+    "mean_field_conductivity": "engines.dtem.effective",
+    "overlap_contacts": "medium.rules",
     "pack": "packing",
     "parse_radii": "packing",
-    "pipe_conductivity": "pipe.steady",
-    "pipe_transient": "pipe.transient",
-    "read_csv": "packing.files",
-    "read_dump": "packing.dumps",
+    "pipe_conductivity": "engines.pipe.steady",
+    "pipe_transient": "engines.pipe.transient",
+    "read_csv": "particle_files.csv_files",
+    "read_dump": "particle_files.dumps",
     "realize": "realization",
-    "recover_field": "dtem.field",
-    "solid_fraction": "packing",
-    "solve_steady": "dtem.steady",
-    "temperatures_inside": "dtem.interior",
-    "transient_system": "dtem.transient",
+    "recover_field": "engines.dtem.field",
+    "solid_fraction": "structure.union",
+    "solve_steady": "engines.dtem.steady",
+    "temperatures_inside": "engines.dtem.interior",
+    "transient_system": "engines.dtem.transient",
 }
 
 __all__ = [

@@ -68,13 +68,14 @@ def made_sweep():
     ``conduct(density, angle in degrees or None, method, realization)`` is k_xx and k_yy, a pair or one number for
     both; None is a packing that failed. The solid fraction is ``solid(density)``.
     """
-    from etc_engine.batch.dataset import assemble
-    from etc_engine.batch.plan import Unit
-    from etc_engine.batch.provenance import attributes, this_run
-    from etc_engine.batch.records import Record
-    from etc_engine.batch.study import parse_study
-    from etc_engine.batch.table import tabulate
+    from etc_engine.durable.provenance import this_run
     from etc_engine.realization import Cell, Realization, Status
+    from etc_engine.study.sweep import parse_study
+    from etc_engine.sweep.attributes import global_attributes
+    from etc_engine.sweep.dataset import assemble
+    from etc_engine.sweep.plan import Unit
+    from etc_engine.sweep.records import Record
+    from etc_engine.sweep.table import tabulate
 
     def cell(value, mean_field: float) -> Cell:
         if value is None:
@@ -96,6 +97,8 @@ def made_sweep():
                 result = Realization(100, density, solid(density), 0.01, values)
                 unit = Unit(density, r)
                 records.append(Record(unit, result, 0, "here", 0.0, 1.0))
-        return assemble(study, tabulate(study, records), attributes(study, text, [this_run("made", 1, "")], ["here"]))
+        return assemble(
+            study, tabulate(study, records), global_attributes(study, text, [this_run("made", 1, "")], ["here"])
+        )
 
     return build

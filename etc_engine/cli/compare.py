@@ -29,10 +29,10 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     over the density. Exit status 3 if a rigorous bound is broken, which can happen to overlapping particles and to
     composites only.
     """
-    from etc_engine.batch.dataset import open_dataset
     from etc_engine.cli.options import check_picture, check_place, print_json, replacing
     from etc_engine.comparison import evaluate_models, fit_models, model_lines
     from etc_engine.errors import InputError
+    from etc_engine.sweep.dataset import open_dataset
 
     if output is not None:
         check_picture(output)
@@ -42,7 +42,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     if not (dataset["count"] > 0).any():
         raise InputError(f"{result} has no cell with a conductivity to compare: see `etc-engine info` and `message`")
     if output is not None:
-        from etc_engine.figures import save_comparison
+        from etc_engine.output.figures import save_comparison
 
         with replacing(output) as file:
             save_comparison(comparison, model_lines(comparison), file)
@@ -63,7 +63,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
 
 def _cells(comparison: xarray.Dataset) -> list[tuple[dict[str, Any], xarray.Dataset]]:
     """Every cell of the sweep with its labels, densities outermost."""
-    from etc_engine.batch.dataset import SWEPT
+    from etc_engine.sweep.dataset import SWEPT
 
     dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]
     indices = itertools.product(*(range(comparison.sizes[dim]) for dim in dims))
@@ -139,7 +139,7 @@ def _shown(comparison: xarray.Dataset) -> list[str]:
 
 
 def _print_table(comparison: xarray.Dataset) -> None:
-    from etc_engine.batch.dataset import SWEPT
+    from etc_engine.sweep.dataset import SWEPT
 
     shown = _shown(comparison)
     dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from etc_engine.composite import Composite, Homogenized
-    from etc_engine.packing.files import ParticleTable
+    from etc_engine.medium.composite import Composite, Homogenized
+    from etc_engine.particle_files.csv_files import ParticleTable
 
 ENGINES = ("voxel", "lattice")
 
@@ -74,8 +74,8 @@ def homogenize_command(
     import numpy as np
 
     from etc_engine.cli.options import check_picture, check_place, print_json
-    from etc_engine.composite import Composite
     from etc_engine.errors import InputError
+    from etc_engine.medium.composite import Composite
 
     fft = {"resolution": resolution, "solver": solver, "green": green, "voxels": voxels, "plot": plot}
     lattice = {"particles": particles, "seed": seed}
@@ -139,7 +139,7 @@ def _read(path: Path, box: str | None, frame: int | None, boundary: str | None) 
     from etc_engine.box import AXES
     from etc_engine.cli.options import parse_box
     from etc_engine.errors import InputError
-    from etc_engine.packing.formats import format_to_read, read_particles
+    from etc_engine.particle_files.formats import format_to_read, read_particles
 
     if not path.exists():
         raise InputError(f"there is no file {path}")
@@ -158,7 +158,7 @@ def _read(path: Path, box: str | None, frame: int | None, boundary: str | None) 
 
 
 def _by_voxels(composite: Composite, boundary: str, options: dict[str, Any]) -> Homogenized:
-    from etc_engine.voxel import homogenize_voxel
+    from etc_engine.engines.voxel import homogenize_voxel
 
     return homogenize_voxel(composite, boundary=boundary, threads=_threads(), **options)
 
@@ -172,8 +172,8 @@ def _threads() -> int:
 def _by_lattice(composite: Composite, boundary: str, particles: int, seed: int) -> Homogenized:
     import numpy as np
 
+    from etc_engine.engines.lattice.homogenize import homogenize_lattice
     from etc_engine.errors import InputError
-    from etc_engine.lattice.homogenize import homogenize_lattice
 
     if composite.dimension == 2:
         raise InputError("the lattice is made of spheres, the inclusions are disks: use --engine voxel")
@@ -210,10 +210,10 @@ def _write(
     """The inclusions with their conductivities, and the tensor, as netCDF."""
     if path is None:
         return
-    from etc_engine.batch.provenance import engine_version
     from etc_engine.box import AXES
     from etc_engine.cli.options import replacing
-    from etc_engine.packing.netcdf import packing_dataset
+    from etc_engine.durable.provenance import engine_version
+    from etc_engine.particle_files.netcdf import packing_dataset
 
     attributes = {key: value for key, value in record.items() if key != "conductivity_tensor"}
     attributes |= {
@@ -238,8 +238,8 @@ def _draw(
 ) -> None:
     """A section, from one more solve that keeps the field."""
     from etc_engine.cli.options import replacing
-    from etc_engine.figures.voxel import save_section
-    from etc_engine.voxel.section import solve_section
+    from etc_engine.engines.voxel.section import solve_section
+    from etc_engine.output.figures.voxel import save_section
 
     section = solve_section(composite, boundary=boundary, threads=_threads(), **options)
     caption = f"k$_{{xx}}$ = {record['conductivity_tensor'][0, 0]:.6g} W/(m K), f = {record['volume_fraction']:.4f}"

@@ -21,7 +21,7 @@ def info_command(file: Path, study: bool, as_json: bool) -> None:
 
     `etc-engine info FILE.nc --study > again.toml` gives the study back, ready to be run again.
     """
-    from etc_engine.batch.dataset import open_dataset
+    from etc_engine.sweep.dataset import open_dataset
 
     dataset = open_dataset(file)
     if study:

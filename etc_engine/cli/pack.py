@@ -64,10 +64,10 @@ def pack_command(
     from etc_engine.cli.progress import PackingProgress
     from etc_engine.errors import InputError
     from etc_engine.packing import PackingSpec, pack
-    from etc_engine.packing.files import ParticleTable
-    from etc_engine.packing.formats import write_particles
     from etc_engine.packing.neighbors import neighbor_pairs
     from etc_engine.packing.radii import parse_radii
+    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.formats import write_particles
 
     if seed is not None and seed < 0:
         raise InputError(f"--seed must not be negative, found {seed}")
@@ -104,7 +104,7 @@ def pack_command(
         }
         write_particles(file, ParticleTable(packing), _provenance(options, output))
     if plot is not None:
-        from etc_engine.figures import save_structure
+        from etc_engine.output.figures import save_structure
 
         with replacing(plot) as file:
             save_structure(packing, file, contact_gap)
@@ -143,8 +143,8 @@ def _warn_of_growth(packing: ParticlePacking, density: float) -> None:
 
 def _check_format(output: Path) -> None:
     """Refuse a file that could not be written, before the work begins."""
-    from etc_engine.packing.formats import VTP, format_to_write
-    from etc_engine.packing.vtp import require_vtk
+    from etc_engine.particle_files.formats import VTP, format_to_write
+    from etc_engine.particle_files.vtp import require_vtk
 
     if format_to_write(output) is VTP:
         require_vtk()

@@ -19,7 +19,6 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     Figures, statistics, models, convergence, failures and provenance. Further results of the same study in boxes of
     other sizes show the convergence with system size. Exit status 3 if a rigorous bound is broken.
     """
-    from etc_engine.batch.dataset import open_dataset
     from etc_engine.cli.options import check_picture, check_place, replacing
     from etc_engine.comparison import (
         evaluate_models,
@@ -29,7 +28,8 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
         samples,
         system_sizes,
     )
-    from etc_engine.results.report import report_page
+    from etc_engine.output.report import report_page
+    from etc_engine.sweep.dataset import open_dataset
 
     check_picture(output.with_suffix(".png"))
     check_place(output, *results)
@@ -37,7 +37,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     dataset = datasets[0]
     comparison, systems = evaluate_models(dataset), system_sizes(datasets)
 
-    from etc_engine import figures
+    from etc_engine.output import figures
 
     drawn = {
         "comparison": figures.draw_comparison(comparison, model_lines(comparison)),

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from etc_engine.batch.rerun import Comparison
-    from etc_engine.batch.sweep import Realize
+    from etc_engine.sweep.rerun import Comparison
+    from etc_engine.sweep.sweep import Realize
 
 EXIT_DIFFERENT = 1
 
@@ -33,9 +33,9 @@ def compare_again(
 ) -> int:
     """Run a realization again and tell the result; ``realize`` may be a stand-in."""
     from etc_engine import realization as real
-    from etc_engine.batch.dataset import open_dataset
-    from etc_engine.batch.provenance import versions
-    from etc_engine.batch.rerun import rerun
+    from etc_engine.durable.provenance import versions
+    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.rerun import rerun
 
     dataset = open_dataset(file)
     comparison = rerun(dataset, density, realization, realize or real.realize)

@@ -14,12 +14,12 @@ import click
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from etc_engine.contacts import ContactNetwork
-    from etc_engine.dtem.field import ParticleField
-    from etc_engine.dtem.steady import SteadySolution
-    from etc_engine.packing.files import ParticleTable
-    from etc_engine.pipe.steady import PipeSolution
-    from etc_engine.tensor import EffectiveConductivity
+    from etc_engine.engines.dtem.field import ParticleField
+    from etc_engine.engines.dtem.steady import SteadySolution
+    from etc_engine.engines.pipe.steady import PipeSolution
+    from etc_engine.medium.conductivity import EffectiveConductivity
+    from etc_engine.medium.network import ContactNetwork
+    from etc_engine.particle_files.csv_files import ParticleTable
 
     Result = EffectiveConductivity[SteadySolution] | EffectiveConductivity[PipeSolution]
 
@@ -80,8 +80,8 @@ def solve_command(
     from math import radians
 
     from etc_engine.cli.options import print_json
-    from etc_engine.contacts import bonded_contacts, overlap_contacts
     from etc_engine.errors import InputError
+    from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
@@ -134,8 +134,8 @@ class _Asked:
         """Conductivity, and the field of the load along x."""
         axes = (0, 1) if all(self.periodic) else (0,)
         if self.method == "pipe":
-            from etc_engine.pipe.field import pipe_field
-            from etc_engine.pipe.steady import pipe_conductivity
+            from etc_engine.engines.pipe.field import pipe_field
+            from etc_engine.engines.pipe.steady import pipe_conductivity
 
             pipes = pipe_conductivity(
                 network,
@@ -145,8 +145,8 @@ class _Asked:
                 axes=axes,
             )
             return pipes, pipe_field(pipes.solutions[0])
-        from etc_engine.dtem.field import recover_field
-        from etc_engine.effective import effective_conductivity
+        from etc_engine.engines.dtem.effective import effective_conductivity
+        from etc_engine.engines.dtem.field import recover_field
 
         elements = effective_conductivity(
             network,
@@ -163,7 +163,7 @@ def _read(particles: Path, box: str | None, periodic: str | None, frame: int | N
     """A particle file of any format, and its box if it brings none."""
     from etc_engine.cli.options import parse_box
     from etc_engine.errors import InputError
-    from etc_engine.packing.formats import format_to_read, read_particles
+    from etc_engine.particle_files.formats import format_to_read, read_particles
 
     if not particles.exists():
         raise InputError(f"there is no file {particles}")
@@ -213,8 +213,8 @@ def _write(
     solution = result.solutions[0]
     with ExitStack() as files:
         if outputs.netcdf is not None:
-            from etc_engine.batch.provenance import engine_version
-            from etc_engine.results.single import solve_dataset
+            from etc_engine.durable.provenance import engine_version
+            from etc_engine.output.single import solve_dataset
 
             plain = {key: value for key, value in record.items() if key != "contact_temperatures"}
             plain["percolates"] = int(plain["percolates"])
@@ -226,11 +226,11 @@ def _write(
             file = files.enter_context(replacing(outputs.netcdf))
             solve_dataset(solution, field, plain).to_netcdf(file, engine="netcdf4")
         if outputs.vtk is not None:
-            from etc_engine.results.vtk import write_vtp
+            from etc_engine.output.vtk import write_vtp
 
             write_vtp(files.enter_context(replacing(outputs.vtk)), solution, field)
         if outputs.plot is not None:
-            from etc_engine.figures import save_field
+            from etc_engine.output.figures import save_field
 
             caption = f"{record['method']}: k = {record['conductivity']:.6g} W/(m K), {record['particles']} particles"
             if "conductivity_bounds" in record:
@@ -240,8 +240,8 @@ def _write(
 
 
 def _warn_of_close_arcs(method: str, solution: SteadySolution | PipeSolution) -> None:
-    from etc_engine.dtem.sides import count_close_arcs
-    from etc_engine.pipe.steady import PipeSolution
+    from etc_engine.engines.pipe.steady import PipeSolution
+    from etc_engine.medium.sides import count_close_arcs
 
     if method == "exact" or isinstance(solution, PipeSolution):
         return
@@ -280,9 +280,9 @@ def _record(
     result: Result,
     field: ParticleField,
 ) -> dict[str, Any]:
-    from etc_engine.dtem.model_error import chord_error_estimate
-    from etc_engine.effective import conductivity_bounds
-    from etc_engine.pipe.steady import PipeSolution
+    from etc_engine.engines.dtem.effective import conductivity_bounds
+    from etc_engine.engines.dtem.model_error import chord_error_estimate
+    from etc_engine.engines.pipe.steady import PipeSolution
     from etc_engine.realization import Status
 
     percolates = bool(result.spans[0])

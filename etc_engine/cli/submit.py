@@ -27,9 +27,9 @@ def submit_command(
     The same study again is answered from the result that is there. With --wait the exit status is that of `sweep`: 0
     done, 4 done with failed realizations, 75 ended without a result.
     """
-    from etc_engine.batch.study import read_study
     from etc_engine.cli.options import check_place, print_json
     from etc_engine.service import client
+    from etc_engine.study.sweep import read_study
 
     _, text = read_study(study)
     if output is not None:

@@ -11,9 +11,9 @@ import click
 from etc_engine.errors import EtcError, OutputError
 
 if TYPE_CHECKING:
-    from etc_engine.batch.claim import Policy
-    from etc_engine.batch.scheduler import Communicator
-    from etc_engine.batch.sweep import Outcome, Realize
+    from etc_engine.sweep.claim import Policy
+    from etc_engine.sweep.scheduler import Communicator
+    from etc_engine.sweep.sweep import Outcome, Realize
 
 EXIT_FAILED_CELLS = 4
 EXIT_RESUMABLE = 75
@@ -47,7 +47,7 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
 def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = None, dry_run: bool = False) -> int:
     """Run a sweep on the ranks that were started; answers the exit status. ``realize`` may be a stand-in."""
     from etc_engine import realization
-    from etc_engine.batch.scheduler import connect
+    from etc_engine.sweep.scheduler import connect
 
     communicator = connect()
     try:
@@ -67,8 +67,8 @@ def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = 
 
 
 def _run(study: Path, output: Path, policy: Policy, communicator: Communicator, realize: Realize) -> int:
-    from etc_engine.batch.sweep import sweep
     from etc_engine.cli.progress import Progress
+    from etc_engine.sweep.sweep import sweep
 
     started = time.monotonic()
     with Progress() as progress:
@@ -121,8 +121,8 @@ def _commonest_message(output: Path, *, failed: bool) -> str:
     """What most cells of a result say, of those that failed or of those without a path."""
     from collections import Counter
 
-    from etc_engine.batch.dataset import open_dataset
     from etc_engine.realization import Status
+    from etc_engine.sweep.dataset import open_dataset
 
     dataset = open_dataset(output)
     status = dataset["status"].values.ravel()
@@ -137,8 +137,8 @@ def _foretell(study: Path, output: Path, communicator: Communicator, realize: Re
     """Print the forecast of a sweep; rank 0 probes, the others wait."""
     from functools import partial
 
-    from etc_engine.batch.forecast import forecast
-    from etc_engine.batch.scheduler import on_rank_zero
+    from etc_engine.sweep.forecast import forecast
+    from etc_engine.sweep.scheduler import on_rank_zero
 
     found = on_rank_zero(communicator, partial(forecast, study, output, communicator.size, realize))
     communicator.close()

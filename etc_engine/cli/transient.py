@@ -15,7 +15,7 @@ from etc_engine.errors import InputError, OutputError, StudyError
 if TYPE_CHECKING:
     import xarray
 
-    from etc_engine.transient.study import NetworkStudy
+    from etc_engine.study.transient import NetworkStudy
 
 EXIT_RESUMABLE = 75
 
@@ -56,7 +56,7 @@ def transient_command(
 
 def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
     from etc_engine.cli.options import check_place, replacing
-    from etc_engine.meshless.study import run_study
+    from etc_engine.study.meshless import run_study
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
@@ -72,10 +72,10 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
 def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
     from etc_engine.cli.options import replacing
     from etc_engine.cli.progress import PackingProgress
-    from etc_engine.results.series import series_dataset
+    from etc_engine.output.series import series_dataset
+    from etc_engine.study.transient import parse_study
     from etc_engine.transient.run import run_transient
     from etc_engine.transient.states import remove_states, state_folder, state_path
-    from etc_engine.transient.study import parse_study
 
     study = parse_study(content)
     _check_outputs(study, wanted)
@@ -119,7 +119,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
 def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
     """Refuse what cannot be written, or would replace an input, before the work begins."""
     from etc_engine.cli.options import check_picture, check_place
-    from etc_engine.results.series import check_vtk_series
+    from etc_engine.output.series import check_vtk_series
 
     inputs = [wanted.study]
     if study.particles is not None:
@@ -140,8 +140,8 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
     """A complete output: see that it is of this study, and draw what is asked for."""
     import json
 
-    from etc_engine.batch.claim import refuse_other_study
-    from etc_engine.batch.dataset import open_dataset
+    from etc_engine.sweep.claim import refuse_other_study
+    from etc_engine.sweep.dataset import open_dataset
 
     series = open_dataset(wanted.output)
     found = json.loads(series.attrs.get("study_resolved", "{}"))
@@ -154,10 +154,10 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
 def _draw(series: xarray.Dataset, wanted: Wanted) -> str:
     """Write the picture and the VTK series that are asked for; what was written, in words."""
     from etc_engine.cli.options import replacing
-    from etc_engine.results.series import write_vtk_series
+    from etc_engine.output.series import write_vtk_series
 
     if wanted.plot is not None:
-        from etc_engine.figures.transient import save_transient
+        from etc_engine.output.figures.transient import save_transient
 
         with replacing(wanted.plot) as file:
             save_transient(series, file)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from etc_engine.batch.statistics import student_t
 from etc_engine.comparison.simulation import half_trace, simulated, study_of
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
+from etc_engine.sweep.statistics import student_t
 
 if TYPE_CHECKING:
     import xarray

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.batch.statistics import student_t
 from etc_engine.comparison.simulation import Phases, phases, simulated
 from etc_engine.models.filled_polymers import agari_uno, lewis_nielsen
+from etc_engine.sweep.statistics import student_t
 
 if TYPE_CHECKING:
     import xarray

@@ -5,7 +5,6 @@ from etc_engine.packing.density import set_density
 from etc_engine.packing.neighbors import NeighborPairs, neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.radii import RadiusDistribution, parse_radii
-from etc_engine.packing.structure import solid_fraction, union_area, union_volume
 
 __all__ = [
     "METHODS",
@@ -17,7 +16,4 @@ __all__ = [
     "pack",
     "parse_radii",
     "set_density",
-    "solid_fraction",
-    "union_area",
-    "union_volume",
 ]

@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.composite import Composite, Homogenized
-from etc_engine.lattice.homogenize import homogenize_lattice
+from etc_engine.engines.lattice.homogenize import homogenize_lattice
+from etc_engine.engines.voxel.homogenize import homogenize_voxel
+from etc_engine.medium.composite import Composite, Homogenized
 from etc_engine.packing import ParticlePacking
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.realization.outcome import Cell, Cells, Status, attempted
 from etc_engine.realization.specification import CompositeSpec, RealizationSpec, particle_conductivities
-from etc_engine.voxel.homogenize import homogenize_voxel
 
 TOUCHING = 1e-6
 """Surfaces closer than this, in mean radii of the pair, count as a contact."""

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from etc_engine.dtem.methods import METHODS as DTEM_METHODS
+from etc_engine.engines.dtem.methods import METHODS as DTEM_METHODS
 from etc_engine.errors import PackingError
 from etc_engine.packing import ParticlePacking, pack
-from etc_engine.packing.structure import solid_fraction
 from etc_engine.realization.composites import conduct_lattice, conduct_voxel
 from etc_engine.realization.networks import conduct_dtem, conduct_pipe
 from etc_engine.realization.outcome import Cell, Cells, Realization, Status, uniform_cells
 from etc_engine.realization.specification import RealizationSpec
+from etc_engine.structure.union import solid_fraction
 
 
 @dataclass(frozen=True)

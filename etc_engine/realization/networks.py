@@ -10,27 +10,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
-from etc_engine.dtem.model_error import chord_error_estimate
-from etc_engine.dtem.steady import SteadySolution
-from etc_engine.effective import (
+from etc_engine.engines.dtem.effective import (
     CurvePoint,
     conductivity_bounds,
     conductivity_curve,
     effective_conductivity,
     mean_field_conductivity,
 )
+from etc_engine.engines.dtem.model_error import chord_error_estimate
+from etc_engine.engines.dtem.steady import SteadySolution
+from etc_engine.engines.pipe.steady import PipeSolution, pipe_conductivity
 from etc_engine.errors import EtcError, InputError
+from etc_engine.medium.backbone import Backbone, find_backbones
+from etc_engine.medium.conductivity import EffectiveConductivity
+from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.packing import ParticlePacking
-from etc_engine.percolation import Backbone, find_backbones
-from etc_engine.pipe.steady import PipeSolution, pipe_conductivity
 from etc_engine.realization.outcome import Cell, Cells, Status, attempted, uniform_cells
 from etc_engine.realization.specification import (
     ContactSpec,
     RealizationSpec,
     particle_conductivities,
 )
-from etc_engine.tensor import EffectiveConductivity
 
 CURVE_ANGLES = 4
 """From this many half-angles on, solving them together saves time."""

@@ -12,10 +12,10 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from etc_engine.batch.study import Study, parse_study
 from etc_engine.errors import StudyError
 from etc_engine.packing import parse_radii
 from etc_engine.service.settings import Limits
+from etc_engine.study.sweep import Study, parse_study
 
 SOURCE = "study"
 FULL = 1.0

@@ -16,7 +16,7 @@ from pydantic import AfterValidator
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
-from etc_engine.batch.provenance import engine_version
+from etc_engine.durable.provenance import engine_version
 from etc_engine.errors import InputError, StudyError
 from etc_engine.models import CATALOGUE
 from etc_engine.models.catalogue import find_model

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from etc_engine.batch.dataset import assemble, open_dataset
-from etc_engine.batch.shards import SUFFIX, ShardReader
-from etc_engine.batch.study import Study, read_study
-from etc_engine.batch.table import Table, join, tabulate
 from etc_engine.realization import Status
 from etc_engine.service.curve import curve_of
 from etc_engine.service.store import Store
+from etc_engine.study.sweep import Study, read_study
+from etc_engine.sweep.dataset import assemble, open_dataset
+from etc_engine.sweep.shards import SUFFIX, ShardReader
+from etc_engine.sweep.table import Table, join, tabulate
 
 if TYPE_CHECKING:
     import xarray

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from etc_engine.batch.lock import boot_identity, process_start_of
+from etc_engine.durable.lock import boot_identity, process_start_of
 
 PATIENCE = 10.0
 """Seconds that killed processes are given to vanish."""

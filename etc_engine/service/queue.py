@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from etc_engine.batch.provenance import now
+from etc_engine.durable.provenance import now
 from etc_engine.errors import InputError, OutputError
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from etc_engine.errors import InputError, OutputError
-from etc_engine.packing.formats import CSV, DUMP, format_to_read
+from etc_engine.particle_files.formats import CSV, DUMP, format_to_read
 from etc_engine.service.launchers import HELD, batch_environment
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store

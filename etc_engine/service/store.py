@@ -21,8 +21,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from etc_engine.batch.shards import shard_folder, write_atomically
+from etc_engine.durable.files import write_atomically
 from etc_engine.errors import OutputError
+from etc_engine.sweep.shards import shard_folder
 
 FORMAT = 1
 FIRST = {"lock", "scratch", "studies"}

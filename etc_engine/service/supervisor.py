@@ -12,7 +12,7 @@ import threading
 import time
 from dataclasses import dataclass, field
 
-from etc_engine.batch.provenance import now
+from etc_engine.durable.provenance import now
 from etc_engine.errors import EtcError
 from etc_engine.service.launchers import Ended, Launcher
 from etc_engine.service.live import LiveResults, log_tail

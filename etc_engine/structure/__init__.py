@@ -1,0 +1,1 @@
+"""What a packing looks like: its union, its statistics, its Laguerre tessellation."""

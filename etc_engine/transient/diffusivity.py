@@ -18,12 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 from scipy.sparse.csgraph import connected_components
 
-from etc_engine.contacts import ContactNetwork
+from etc_engine.engines.pipe.steady import pipe_conductivity
 from etc_engine.errors import InputError
-from etc_engine.pipe.steady import pipe_conductivity
+from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.walls import WALLS, FixedTemperature
+from etc_engine.realization.transients import SYSTEMS, Physics
 from etc_engine.solvers.marching import march
-from etc_engine.transient.systems import SYSTEMS, Physics
-from etc_engine.walls import WALLS, FixedTemperature
 
 TERMS = 200
 SHORT = 1e-4
@@ -154,7 +154,7 @@ def effective_diffusivity(
     network : ContactNetwork
         Walled along x.
     resistance, conductivity, contact_resistance
-        As in `etc_engine.pipe.conductances.pipe_conductances`.
+        As in `etc_engine.engines.pipe.conductances.pipe_conductances`.
     heat_capacity : float or array_like, shape (n,) [J/(m3 K)]
         rho c of all particles, or of each.
     heated : str

@@ -19,13 +19,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from etc_engine.contacts import ContactNetwork
-from etc_engine.dtem.steady import per_particle
+from etc_engine.engines.dtem.steady import per_particle
 from etc_engine.errors import EtcError, InputError
+from etc_engine.medium.network import ContactNetwork
 from etc_engine.packing.particles import ParticlePacking, particle_values
-from etc_engine.packing.trajectory import Trajectory
+from etc_engine.particle_files.trajectory import Trajectory
+from etc_engine.realization.transients import ParticleSystem
 from etc_engine.solvers.marching import march
-from etc_engine.transient.systems import ParticleSystem
 
 Build = Callable[[ContactNetwork, NDArray[np.float64]], ParticleSystem]
 """(network, heat capacity of each particle [J/(m K)]) -> system; walls, materials and sources are the builder's.
@@ -153,7 +153,7 @@ def march_trajectory(
     trajectory : Trajectory
         Two-dimensional.
     contacts : callable
-        packing -> contact network, such as `etc_engine.contacts.overlap_contacts`.
+        packing -> contact network, such as `etc_engine.medium.network.overlap_contacts`.
     build : callable
         (network, capacities) -> system of that network.
     initial : float or array_like, shape (n,) [K]
@@ -192,9 +192,9 @@ def march_trajectory(
     Two disks of different temperature that part after the first interval:
 
     >>> from etc_engine import Box
-    >>> from etc_engine.contacts import overlap_contacts
-    >>> from etc_engine.dtem.storage import stored_areas
-    >>> from etc_engine.pipe.transient import pipe_transient
+    >>> from etc_engine.medium.rules import overlap_contacts
+    >>> from etc_engine.engines.dtem.storage import stored_areas
+    >>> from etc_engine.engines.pipe.transient import pipe_transient
     >>> box = Box((4.0, 1.0))
     >>> disks = [ParticlePacking([[1.0, 0.5], [x, 0.5]], [0.3, 0.3], box) for x in (1.55, 2.5, 2.5)]
     >>> def pipes(network, capacities):

@@ -10,21 +10,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from etc_engine.batch.stop import Stopped, StopRequest
 from etc_engine.box import Box, parse_periodic
-from etc_engine.contacts import ContactNetwork, bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
+from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.medium.walls import value_at
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
-from etc_engine.packing.dumps import read_trajectory
-from etc_engine.packing.formats import format_to_read, read_particles
-from etc_engine.packing.trajectory import Trajectory
+from etc_engine.particle_files.dumps import read_trajectory
+from etc_engine.particle_files.formats import format_to_read, read_particles
+from etc_engine.particle_files.trajectory import Trajectory
+from etc_engine.realization.transients import SYSTEMS, ParticleSystem, Physics, storing_area
 from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
+from etc_engine.study.transient import Gradient, NetworkStudy, plain, refuse_endless
 from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
 from etc_engine.transient.states import State, claimed_states, write_state
-from etc_engine.transient.study import Gradient, NetworkStudy, plain, refuse_endless
-from etc_engine.transient.systems import SYSTEMS, ParticleSystem, Physics, storing_area
-from etc_engine.walls import value_at
 
 Progress = Callable[[float], None]
 PLANAR_LEVEL = 300_000

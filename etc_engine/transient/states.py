@@ -1,7 +1,7 @@
 """States of a transient on disk: a run that was killed goes on from the last one, with the same bits.
 
 Beside ``out.nc`` stands the folder ``out.nc.states`` with a file for each output time, put in place whole or not at
-all, a lock (see `etc_engine.batch.lock`) and the digest of the study and of its particles.
+all, a lock (see `etc_engine.durable.lock`) and the digest of the study and of its particles.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from uuid import uuid4
 
 import numpy as np
 
-from etc_engine.batch.lock import Lock
-from etc_engine.batch.shards import clear_folder, write_atomically
+from etc_engine.durable.files import write_atomically
+from etc_engine.durable.lock import Lock
 from etc_engine.errors import OutputError, StudyError
 from etc_engine.solvers.marching import MarchState
+from etc_engine.sweep.shards import clear_folder
 from etc_engine.transient.moving import MovingState
 
 State = MarchState | MovingState

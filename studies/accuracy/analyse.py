@@ -26,10 +26,10 @@ from etc_engine import (
     parse_radii,
     read_csv,
 )
-from etc_engine.contacts import ContactNetwork
-from etc_engine.dtem.model_error import chord_error_estimate, chord_error_terms
-from etc_engine.effective import conductivity_bounds
+from etc_engine.engines.dtem.effective import conductivity_bounds
+from etc_engine.engines.dtem.model_error import chord_error_estimate, chord_error_terms
 from etc_engine.errors import GeometryError
+from etc_engine.medium.network import ContactNetwork
 
 HERE = Path(__file__).parent
 SEED = 4201

@@ -10,8 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import reference as paper
 
-from etc_engine.errors import ConvergenceError
-from etc_engine.meshless import (
+from etc_engine.engines.meshless import (
     ContactArc,
     Discretization,
     DiscretizationWarning,
@@ -20,6 +19,7 @@ from etc_engine.meshless import (
     heat_disk_through_arcs,
     solve_transient,
 )
+from etc_engine.errors import ConvergenceError
 
 HERE = Path(__file__).resolve().parent
 SCHEMES = ("backward-euler", "crank-nicolson", "bdf2", "sdirk2")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from etc_engine.meshless import Dirichlet, HeatProblem, Neumann
+from etc_engine.engines.meshless import Dirichlet, HeatProblem, Neumann
 
 SIDE, CONDUCTIVITY, INITIAL = 3.0, 1.25, 30.0
 SQUARE = [(0.0, 0.0), (SIDE, 0.0), (SIDE, SIDE), (0.0, SIDE)]

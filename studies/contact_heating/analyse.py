@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine import Box, ContactNetwork, PackingSpec, bonded_contacts, pack, parse_radii
-from etc_engine.dtem.resistance import standard_resistance
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.transient import contact_flows, particle_sides, transient_system
-from etc_engine.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
-from etc_engine.meshless import ContactArc, heat_disk_by_flows
-from etc_engine.pipe.flows import pipe_contact_flows
-from etc_engine.pipe.transient import pipe_transient
+from etc_engine.engines.dtem.transient import contact_flows, particle_sides, transient_system
+from etc_engine.engines.meshless import ContactArc, heat_disk_by_flows
+from etc_engine.engines.pipe.flows import pipe_contact_flows
+from etc_engine.engines.pipe.transient import pipe_transient
+from etc_engine.laws.disk import standard_resistance
+from etc_engine.medium.sides import contact_sides
+from etc_engine.medium.walls import FixedTemperature
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
 from etc_engine.solvers.marching import march
-from etc_engine.walls import FixedTemperature
 
 HERE = Path(__file__).parent
 SEED = 2009

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, pack, parse_radii
-from etc_engine.contacts import coordination_contacts
+from etc_engine.medium.rules import coordination_contacts
 from etc_engine.transient.diffusivity import WINDOW, Diffusivity, effective_diffusivity, slab_mean
 
 HERE = Path(__file__).parent

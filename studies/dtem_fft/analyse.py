@@ -16,10 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, ParticlePacking, effective_conductivity, overlap_contacts, pack, parse_radii
-from etc_engine.composite import Composite
-from etc_engine.contacts import ContactNetwork
-from etc_engine.effective import conductivity_bounds
-from etc_engine.voxel import solve_cell, voxelize
+from etc_engine.engines.dtem.effective import conductivity_bounds
+from etc_engine.engines.voxel import solve_cell, voxelize
+from etc_engine.medium.composite import Composite
+from etc_engine.medium.network import ContactNetwork
 
 HERE = Path(__file__).parent
 SEED = 5107

@@ -17,14 +17,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, ParticlePacking, pack, parse_radii
-from etc_engine.composite import Composite
-from etc_engine.lattice.flux import probe
-from etc_engine.lattice.homogenize import composite_lattice, homogenize_lattice, node_conductivities
-from etc_engine.lattice.network import link_conductances
-from etc_engine.lattice.steady import solve_between_walls
+from etc_engine.engines.lattice.flux import probe
+from etc_engine.engines.lattice.homogenize import composite_lattice, homogenize_lattice, node_conductivities
+from etc_engine.engines.lattice.network import link_conductances
+from etc_engine.engines.lattice.steady import solve_between_walls
+from etc_engine.engines.voxel import homogenize_voxel, solve_cell, voxelize
+from etc_engine.engines.voxel.section import sample, temperature_between_walls
+from etc_engine.medium.composite import Composite
 from etc_engine.models.catalogue import find_model
-from etc_engine.voxel import homogenize_voxel, solve_cell, voxelize
-from etc_engine.voxel.section import sample, temperature_between_walls
 
 HERE = Path(__file__).parent
 SEED = 6203

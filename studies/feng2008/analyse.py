@@ -24,8 +24,8 @@ from etc_engine import (
     read_csv,
     recover_field,
 )
-from etc_engine.dtem.methods import METHODS
-from etc_engine.figures import save_field
+from etc_engine.engines.dtem.methods import METHODS
+from etc_engine.output.figures import save_field
 
 HERE = Path(__file__).parent
 PUBLISHED = HERE.parents[1] / "tests" / "published" / "data"

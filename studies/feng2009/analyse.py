@@ -24,8 +24,8 @@ from etc_engine import (
     parse_radii,
     read_csv,
 )
-from etc_engine.contacts import ContactNetwork
-from etc_engine.pipe.steady import pipe_conductivity
+from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.medium.network import ContactNetwork
 
 HERE = Path(__file__).parent
 TRUTH = 0.2787774  # corner-graded finite elements between two energy bounds, +- 1e-7

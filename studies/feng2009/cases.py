@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine import Box, ContactNetwork, overlap_contacts, read_csv
+from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.walls import FixedTemperature
 
 HERE = Path(__file__).parent
 ASSEMBLY = HERE.parent / "feng2008" / "particles.csv"

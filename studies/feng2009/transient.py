@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from etc_engine.dtem.transient import transient_system
-from etc_engine.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
-from etc_engine.pipe.transient import pipe_transient
+from etc_engine.engines.dtem.transient import transient_system
+from etc_engine.engines.pipe.transient import pipe_transient
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
 from etc_engine.solvers.marching import march
 
 sys.path.insert(0, str(Path(__file__).parent))

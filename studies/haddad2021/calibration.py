@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine.box import Box
-from etc_engine.figures import save
-from etc_engine.figures.lattice import draw_calibration
-from etc_engine.lattice.calibration import calibrate, pack_lattice
-from etc_engine.lattice.homogenize import dense_packing
+from etc_engine.engines.lattice.calibration import calibrate, pack_lattice
+from etc_engine.engines.lattice.homogenize import dense_packing
+from etc_engine.output.figures import save
+from etc_engine.output.figures.lattice import draw_calibration
 
 HERE = Path(__file__).parent
 SIZES = (1000, 3000, 10_000, 30_000, 100_000, 300_000, 1_000_000)

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
-from etc_engine.figures import save
-from etc_engine.figures.lattice import draw_fractions
-from etc_engine.lattice.homogenize import homogenize_lattice
+from etc_engine.engines.lattice.homogenize import homogenize_lattice
+from etc_engine.medium.composite import Composite
 from etc_engine.models.bounds import hashin_shtrikman_lower, hashin_shtrikman_upper
 from etc_engine.models.statistical import third_order
+from etc_engine.output.figures import save
+from etc_engine.output.figures.lattice import draw_fractions
 from etc_engine.packing.lubachevsky_stillinger import compress
 
 HERE = Path(__file__).parent

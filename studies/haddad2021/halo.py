@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine.box import Box
-from etc_engine.figures import save
-from etc_engine.figures.lattice import draw_halo
-from etc_engine.lattice.calibration import calibrate, pack_lattice
-from etc_engine.lattice.flux import halo_flux, mean_flux, near_wall
-from etc_engine.lattice.homogenize import dense_packing
-from etc_engine.lattice.network import contact_lattice, laguerre_lattice, link_conductances
-from etc_engine.lattice.steady import solve_between_walls, solve_with_gradient
+from etc_engine.engines.lattice.calibration import calibrate, pack_lattice
+from etc_engine.engines.lattice.flux import halo_flux, mean_flux, near_wall
+from etc_engine.engines.lattice.homogenize import dense_packing
+from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
+from etc_engine.engines.lattice.steady import solve_between_walls, solve_with_gradient
+from etc_engine.output.figures import save
+from etc_engine.output.figures.lattice import draw_halo
 
 HERE = Path(__file__).parent
 RATIOS = (0.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0)

@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
-from etc_engine.figures import save
-from etc_engine.figures.lattice import draw_inclusion
-from etc_engine.lattice.flux import probe
-from etc_engine.lattice.homogenize import composite_lattice, node_conductivities
-from etc_engine.lattice.network import link_conductances
-from etc_engine.lattice.steady import conductivity_tensor, solve_between_walls
+from etc_engine.engines.lattice.flux import probe
+from etc_engine.engines.lattice.homogenize import composite_lattice, node_conductivities
+from etc_engine.engines.lattice.network import link_conductances
+from etc_engine.engines.lattice.steady import conductivity_tensor, solve_between_walls
+from etc_engine.medium.composite import Composite
 from etc_engine.models.arrays import simple_cubic
+from etc_engine.output.figures import save
+from etc_engine.output.figures.lattice import draw_inclusion
 from etc_engine.packing.particles import ParticlePacking
 
 HERE = Path(__file__).parent

@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine.box import Box
-from etc_engine.figures import save
-from etc_engine.figures.lattice import draw_ball, draw_slab
-from etc_engine.lattice.body import SURFACE, ball_lattice
-from etc_engine.lattice.calibration import calibrate, pack_lattice
-from etc_engine.lattice.exact import ball_temperature, slab_temperature
-from etc_engine.lattice.homogenize import dense_packing
-from etc_engine.lattice.network import contact_lattice, laguerre_lattice, link_conductances
-from etc_engine.lattice.transient import heat_system
+from etc_engine.engines.lattice.body import SURFACE, ball_lattice
+from etc_engine.engines.lattice.calibration import calibrate, pack_lattice
+from etc_engine.engines.lattice.exact import ball_temperature, slab_temperature
+from etc_engine.engines.lattice.homogenize import dense_packing
+from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
+from etc_engine.engines.lattice.transient import heat_system
+from etc_engine.medium.walls import FixedTemperature
+from etc_engine.output.figures import save
+from etc_engine.output.figures.lattice import draw_ball, draw_slab
 from etc_engine.solvers.marching import march
-from etc_engine.walls import FixedTemperature
 
 HERE = Path(__file__).parent
 SEED = 20215

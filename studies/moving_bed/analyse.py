@@ -14,13 +14,14 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from etc_engine import effective_conductivity
-from etc_engine.contacts import ContactNetwork, overlap_contacts
-from etc_engine.dtem.storage import stored_areas
-from etc_engine.packing.trajectory import Trajectory
-from etc_engine.pipe.steady import pipe_conductivity
-from etc_engine.pipe.transient import PipeTransient, pipe_transient
+from etc_engine.engines.dtem.storage import stored_areas
+from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.engines.pipe.transient import PipeTransient, pipe_transient
+from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.rules import overlap_contacts
+from etc_engine.medium.walls import FixedTemperature
+from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.transient.moving import MovingState, march_trajectory
-from etc_engine.walls import FixedTemperature
 
 WALLS = {"bottom": FixedTemperature(1.0), "top": FixedTemperature(0.0)}
 PECLET = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)

@@ -16,9 +16,9 @@ import sys
 import numpy as np
 
 from etc_engine import Box, PackingSpec, ParticlePacking, pack, parse_radii
-from etc_engine.packing.dumps import write_trajectory
 from etc_engine.packing.neighbors import neighbor_pairs
-from etc_engine.packing.trajectory import Trajectory
+from etc_engine.particle_files.dumps import write_trajectory
+from etc_engine.particle_files.trajectory import Trajectory
 
 COUNT, DENSITY = 100, 0.8
 LENGTHS = (1.0, 0.5)

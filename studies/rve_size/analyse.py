@@ -19,9 +19,9 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from etc_engine.batch.plan import Unit, unit_rng
-from etc_engine.batch.study import Study
 from etc_engine.realization import realize
+from etc_engine.study.sweep import Study
+from etc_engine.sweep.plan import Unit, unit_rng
 
 HERE = Path(__file__).parent
 SIZES = (64, 128, 256, 512, 1024, 2048, 4096)

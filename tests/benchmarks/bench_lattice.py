@@ -32,7 +32,7 @@ def peak() -> float:
 def tiled(count: int, tiles: int):
     """A periodic packing of about `count` spheres, tiles^3 copies of a smaller one."""
     from etc_engine.box import Box
-    from etc_engine.lattice.calibration import pack_lattice
+    from etc_engine.engines.lattice.calibration import pack_lattice
     from etc_engine.packing.particles import ParticlePacking
 
     unit = pack_lattice(count // tiles**3, (1.0, 1.0, 1.0), np.random.default_rng(811), density=0.6)
@@ -43,9 +43,9 @@ def tiled(count: int, tiles: int):
 
 def measure(count: int, tiles: int, transmission: str) -> dict:
     """Seconds of every stage, and what memory they add at most."""
-    from etc_engine.lattice.flux import halo_flux
-    from etc_engine.lattice.network import contact_lattice, laguerre_lattice, link_conductances
-    from etc_engine.lattice.steady import solve_with_gradient
+    from etc_engine.engines.lattice.flux import halo_flux
+    from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
+    from etc_engine.engines.lattice.steady import solve_with_gradient
 
     packing = tiled(count, tiles)
     k = np.random.default_rng(7).lognormal(0.0, 0.5, packing.count)

@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 from scipy.sparse.linalg import splu
 
-from etc_engine.meshless import Dirichlet, Discretization, HeatProblem, solve_transient
-from etc_engine.meshless.discretization import lay_out
-from etc_engine.meshless.stepping import GAMMA, StepLibrary, spectral_radius
+from etc_engine.engines.meshless import Dirichlet, Discretization, HeatProblem, solve_transient
+from etc_engine.engines.meshless.discretization import lay_out
+from etc_engine.engines.meshless.stepping import GAMMA, StepLibrary, spectral_radius
 
 SIDE, K, INITIAL, END = 3.0, 1.25, 30.0, 1.2
 POINTS = np.array([(2.4, 1.5), (2.4, 2.4), (1.8, 1.5), (1.8, 1.8), (1.5, 1.5)])

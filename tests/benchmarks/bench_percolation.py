@@ -14,11 +14,11 @@ import numpy as np
 from scipy.sparse.linalg import spsolve
 
 from etc_engine import Box, PackingSpec, bonded_contacts, find_backbone, pack, parse_radii
-from etc_engine.dtem.assembly import assemble
-from etc_engine.dtem.element import Material
-from etc_engine.dtem.methods import METHODS
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.steady import prescribe
+from etc_engine.engines.dtem.assembly import assemble
+from etc_engine.engines.dtem.element import Material
+from etc_engine.engines.dtem.methods import METHODS
+from etc_engine.engines.dtem.steady import prescribe
+from etc_engine.medium.sides import contact_sides
 from etc_engine.solvers import build_preconditioner, solve_energy
 
 

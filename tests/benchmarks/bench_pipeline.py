@@ -35,14 +35,14 @@ def peak() -> float:
 def measure(count: int, direct: bool, stock: bool) -> dict:
     """Seconds and peak memory after each stage for about ``count`` disks between walls."""
     from etc_engine.box import Box
-    from etc_engine.contacts import bonded_contacts
-    from etc_engine.dtem.assembly import assemble
-    from etc_engine.dtem.element import Material
-    from etc_engine.dtem.methods import METHODS
-    from etc_engine.dtem.sides import contact_sides
-    from etc_engine.dtem.steady import prescribe
+    from etc_engine.engines.dtem.assembly import assemble
+    from etc_engine.engines.dtem.element import Material
+    from etc_engine.engines.dtem.methods import METHODS
+    from etc_engine.engines.dtem.steady import prescribe
+    from etc_engine.medium.backbone import find_backbone
+    from etc_engine.medium.rules import bonded_contacts
+    from etc_engine.medium.sides import contact_sides
     from etc_engine.packing import PackingSpec, pack, parse_radii
-    from etc_engine.percolation import find_backbone
     from etc_engine.solvers import build_preconditioner, solve_energy
 
     seconds, memory = {}, {"start": peak()}

@@ -20,13 +20,13 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMB
 import numpy as np  # noqa: E402 - after the thread counts are set
 
 from etc_engine.box import Box  # noqa: E402
-from etc_engine.contacts import ContactNetwork, bonded_contacts  # noqa: E402
+from etc_engine.engines.pipe.conductances import pipe_conductances  # noqa: E402
+from etc_engine.engines.pipe.steady import pipe_conductivity  # noqa: E402
+from etc_engine.engines.pipe.transient import pipe_transient  # noqa: E402
+from etc_engine.medium.network import ContactNetwork, bonded_contacts  # noqa: E402
+from etc_engine.medium.walls import FixedTemperature  # noqa: E402
 from etc_engine.packing import PackingSpec, pack, parse_radii  # noqa: E402
-from etc_engine.pipe.conductances import pipe_conductances  # noqa: E402
-from etc_engine.pipe.steady import pipe_conductivity  # noqa: E402
-from etc_engine.pipe.transient import pipe_transient  # noqa: E402
 from etc_engine.solvers.marching import march  # noqa: E402
-from etc_engine.walls import FixedTemperature  # noqa: E402
 
 RADII = "uniform:0.01:0.02"
 DISKS_PER_AREA = 1098.0  # of this size distribution, measured

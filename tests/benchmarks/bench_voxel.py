@@ -34,7 +34,7 @@ print(json.dumps({"conductivity": float(found.effective_porosity / found.tortuos
 
 def composite(d: int, count: int, fraction: float, contrast: float):
     from etc_engine import Box, PackingSpec, pack, parse_radii
-    from etc_engine.composite import Composite
+    from etc_engine.medium.composite import Composite
 
     box = Box((1.0,) * d, (True,) * d)
     spec = PackingSpec("lubachevsky-stillinger", parse_radii("equal"), box, count, fraction)
@@ -43,7 +43,7 @@ def composite(d: int, count: int, fraction: float, contrast: float):
 
 def one(d: int, resolution: int, contrast: float, solver: str) -> dict[str, float]:
     """One load along x on an image of 50 inclusions, 40 % of them."""
-    from etc_engine.voxel import solve_cell, voxelize
+    from etc_engine.engines.voxel import solve_cell, voxelize
 
     made = composite(d, 50, 0.4, contrast)
     voxelize(made, 32)  # compile
@@ -93,7 +93,7 @@ def table(largest: int) -> None:
 
 def against_porespy(python: str) -> None:
     """The same image of pores between walls, spheres insulating; ratios of one run."""
-    from etc_engine.voxel import solve_cell, voxelize
+    from etc_engine.engines.voxel import solve_cell, voxelize
 
     print(f"{'voxels':>10}{'k/k0 porespy':>14}{'k/k0 FFT':>10}{'porespy s':>11}{'FFT s':>8}{'ratio':>7}")
     for d, n in ((2, 256), (2, 512), (3, 48), (3, 64), (3, 96)):

@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from etc_engine.batch.dataset import write_dataset
 from etc_engine.cli import run
+from etc_engine.sweep.dataset import write_dataset
 
 STUDY = """
 schema = 1

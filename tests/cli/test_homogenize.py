@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 
 from etc_engine.box import Box
-from etc_engine.packing.files import ParticleTable
-from etc_engine.packing.formats import write_particles
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.csv_files import ParticleTable
+from etc_engine.particle_files.formats import write_particles
 
 RADIUS_3D = float(np.cbrt(0.75 * 0.3 / np.pi))
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from etc_engine.packing.dumps import read_trajectory, write_trajectory
 from etc_engine.packing.neighbors import neighbor_pairs
+from etc_engine.particle_files.dumps import read_trajectory, write_trajectory
 
 STUDY = Path(__file__).parents[2] / "studies" / "moving_bed"
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.packing.files import read_csv
-from etc_engine.packing.formats import read_particles
+from etc_engine.particle_files.csv_files import read_csv
+from etc_engine.particle_files.formats import read_particles
 
 
 @pytest.fixture

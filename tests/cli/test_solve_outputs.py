@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import xarray
 
-from etc_engine.contacts import overlap_contacts
-from etc_engine.dtem.field import recover_field
-from etc_engine.dtem.raster import sample_image
-from etc_engine.effective import effective_conductivity
+from etc_engine.engines.dtem.effective import effective_conductivity
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.raster import sample_image
+from etc_engine.medium.rules import overlap_contacts
 
 TABLE_2 = Path(__file__).parents[1] / "published" / "data" / "feng2008_table2_particles.csv"
 BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
@@ -54,7 +54,7 @@ def test_vtk_holds_disks_and_contacts(etc_engine, tmp_path):
 
 def _table_2():
     from etc_engine.box import Box
-    from etc_engine.packing.files import read_csv
+    from etc_engine.particle_files.csv_files import read_csv
 
     return read_csv(TABLE_2, Box((1.0, 1.0))).packing
 
@@ -63,7 +63,7 @@ def test_image_fills_the_particles_and_their_union():
     packing = _table_2()
     solution = effective_conductivity(overlap_contacts(packing), axes=(0,)).solutions[0]
     image, owners = sample_image(solution, recover_field(solution), 500)
-    from etc_engine.packing.structure import union_area
+    from etc_engine.structure.union import union_area
 
     assert np.mean(owners >= 0) == pytest.approx(union_area(packing), abs=2e-3)
     assert np.isfinite(image[owners >= 0]).all()
@@ -73,7 +73,7 @@ def test_image_fills_the_particles_and_their_union():
 
 
 def test_periodic_image_follows_the_gradient(hexagonal):
-    from etc_engine.contacts import bonded_contacts
+    from etc_engine.medium.rules import bonded_contacts
 
     packing = hexagonal(2, 2)
     solution = effective_conductivity(bonded_contacts(packing, 0.15)).solutions[0]

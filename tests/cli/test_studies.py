@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray
 
-from etc_engine.batch.study import read_study
-from etc_engine.transient.study import parse_study as parse_network_study
+from etc_engine.study.sweep import read_study
+from etc_engine.study.transient import parse_study as parse_network_study
 
 ROOT = Path(__file__).parents[2]
 STAND_IN = ROOT / "tests" / "stand_in.py"

@@ -5,8 +5,8 @@ import xarray
 from click.testing import CliRunner
 
 from etc_engine.cli.transient import transient_command
+from etc_engine.engines.meshless import Dirichlet, HeatProblem, solve_transient
 from etc_engine.errors import EtcError, OutputError, StudyError
-from etc_engine.meshless import Dirichlet, HeatProblem, solve_transient
 
 STUDY = """
 schema = 1
@@ -156,7 +156,7 @@ def test_the_study_itself_is_no_output(tmp_path):
     assert study.read_text() == STUDY
 
 
-@pytest.mark.filterwarnings("ignore::etc_engine.meshless.DiscretizationWarning")
+@pytest.mark.filterwarnings("ignore::etc_engine.engines.meshless.DiscretizationWarning")
 @pytest.mark.parametrize(
     "changes",
     [

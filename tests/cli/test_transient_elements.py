@@ -60,8 +60,8 @@ def test_resumed_run_gives_the_same_bits(tmp_path):
     """Three states a particle, of which two are not its temperature: a restart needs them all."""
     import tomllib
 
+    from etc_engine.study.transient import parse_study
     from etc_engine.transient.run import run_transient
-    from etc_engine.transient.study import parse_study
 
     text = write(tmp_path, "chord", True).read_text()
     study = parse_study(tomllib.loads(text))

@@ -5,9 +5,9 @@ import pytest
 import xarray as xr
 
 from etc_engine.box import Box
-from etc_engine.packing.dumps import write_trajectory
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.packing.trajectory import Trajectory
+from etc_engine.particle_files.dumps import write_trajectory
+from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.transient import states
 
 STUDY = """

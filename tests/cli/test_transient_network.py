@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 import xarray
 
-from etc_engine.batch.dataset import differing_variables
-from etc_engine.figures.transient import draw_transient, pick_times
-from etc_engine.pipe.steady import pipe_conductivity
-from etc_engine.results.series import series_dataset
+from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.output.figures.transient import draw_transient, pick_times
+from etc_engine.output.series import series_dataset
 from etc_engine.solvers.marching import SCHEMES
+from etc_engine.study.transient import parse_study
+from etc_engine.sweep.dataset import differing_variables
 from etc_engine.transient.run import run_transient
 from etc_engine.transient.states import read_states, state_folder, state_path, write_state
-from etc_engine.transient.study import parse_study
 
 STUDY = """
 schema = 1

@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from etc_engine.batch.dataset import differing_variables, open_dataset
-from etc_engine.batch.plan import Unit
-from etc_engine.batch.shards import ShardReader, shard_folder
+from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.plan import Unit
+from etc_engine.sweep.shards import ShardReader, shard_folder
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")

@@ -23,10 +23,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "service"))
 
 from serving import STUDY, Service, until
 
-from etc_engine.batch.dataset import differing_variables, open_dataset
 from etc_engine.service import client
 from etc_engine.service.launchers import find_mpiexec
 from etc_engine.service.processes import ProcessIdentity, batch_processes
+from etc_engine.sweep.dataset import differing_variables, open_dataset
 
 pytestmark = [
     pytest.mark.slow,

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from etc_engine.batch.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables, open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
@@ -144,7 +144,7 @@ def test_a_wrong_study_is_one_line_and_status_2_on_two_ranks(study, tmp_path):
 def test_an_error_of_the_program_on_one_rank_ends_all(study, tmp_path, guilty):
     """What no unit catches: without MPI_Abort the other rank would wait for ever."""
     code = (
-        "import sys, pathlib\nimport etc_engine.batch.sweep as s\nfrom etc_engine.cli.sweep import launch\n"
+        "import sys, pathlib\nimport etc_engine.sweep.sweep as s\nfrom etc_engine.cli.sweep import launch\n"
         f"exec(open({str(STAND_IN)!r}).read().split('def main')[0])\n"
         "run = s.run_unit\n"
         "def broken(study, spec, unit, rank, realize):\n"
@@ -164,7 +164,7 @@ def test_an_error_of_the_program_on_one_rank_ends_all(study, tmp_path, guilty):
 @needs_mpi
 def test_the_counter_gives_each_number_once():
     code = (
-        "import sys\nfrom etc_engine.batch.scheduler import connect\nc = connect()\n"
+        "import sys\nfrom etc_engine.sweep.scheduler import connect\nc = connect()\n"
         "mine = [c.add(0, 1) for _ in range(500)]\n"
         "everyone = c.gather(mine)\nc.wait_for_all(lambda: None)\nc.close()\n"
         "if c.rank == 0:\n"

@@ -10,16 +10,16 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.closed_form import closed_form_elements
-from etc_engine.dtem.element import Material
-from etc_engine.dtem.methods import METHODS
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.steady import solve_steady
-from etc_engine.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.closed_form import closed_form_elements
+from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.element import Material
+from etc_engine.engines.dtem.methods import METHODS
+from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.errors import EtcError, GeometryError
+from etc_engine.medium.backbone import find_backbone
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.percolation import find_backbone
 
 METHOD = st.sampled_from(sorted(METHODS))
 SETTINGS = settings(deadline=None, max_examples=40)
@@ -144,7 +144,7 @@ def test_contact_resistance_equals_the_doubled_system(resistance, method):
     doubled = np.sum((1.0 - temperature[hot]) / resistance)
     solution = solve_steady(network, (0,), method=method, contact_resistance=resistance)
     assert solution.energies[0, 0] == pytest.approx(doubled, rel=1e-8)
-    from etc_engine.dtem.field import recover_field
+    from etc_engine.engines.dtem.field import recover_field
 
     field = recover_field(solution)
     np.testing.assert_allclose(field.face_temperatures[backbone.contacts], temperature[sides.of_contacts], atol=2e-9)
@@ -160,7 +160,7 @@ def test_limits_of_the_contact_resistance():
 
 
 def test_clusters_on_one_wall_take_its_temperature():
-    from etc_engine.dtem.field import recover_field
+    from etc_engine.engines.dtem.field import recover_field
 
     triangle = [[0.1, 0.3], [0.3, 0.3], [0.2, 0.3 + np.sqrt(0.03)]]
     packing = ParticlePacking([*triangle, [0.9, 0.5]], [0.1] * 4, Box((1.0, 1.0)))

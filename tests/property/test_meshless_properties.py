@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from etc_engine.meshless import (
+from etc_engine.engines.meshless import (
     Dirichlet,
     Discretization,
     Disk,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.errors import EtcError
-from etc_engine.packing.formats import CSV, DUMP, format_to_read, read_particles
+from etc_engine.particle_files.formats import CSV, DUMP, format_to_read, read_particles
 
 NUMBERS = [
     "0.25",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from etc_engine.contacts import bonded_contacts
-from etc_engine.effective import effective_conductivity
+from etc_engine.engines.dtem.effective import effective_conductivity
+from etc_engine.medium.rules import bonded_contacts
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ of Table 3 is a misprint of 2.6179. With the same nodes and number of steps they
 import numpy as np
 import pytest
 
-from etc_engine.meshless import (
+from etc_engine.engines.meshless import (
     Dirichlet,
     Discretization,
     HeatProblem,

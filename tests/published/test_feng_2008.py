@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from etc_engine.contacts import overlap_contacts
-from etc_engine.dtem.field import recover_field
-from etc_engine.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.medium.rules import overlap_contacts
 
 DATA = Path(__file__).parent / "data"
 # corner-graded finite elements, energy bounds from above and below agree to 1e-7

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
-from etc_engine.lattice.calibration import calibrate, pack_lattice
-from etc_engine.lattice.exact import ball_temperature, slab_temperature
-from etc_engine.lattice.flux import halo_flux, probe
-from etc_engine.lattice.homogenize import composite_lattice, dense_packing, node_conductivities
-from etc_engine.lattice.network import contact_lattice, laguerre_lattice, link_conductances
-from etc_engine.lattice.steady import conductivity_tensor, solve_between_walls, solve_with_gradient
-from etc_engine.lattice.transient import heat_system
+from etc_engine.engines.lattice.calibration import calibrate, pack_lattice
+from etc_engine.engines.lattice.exact import ball_temperature, slab_temperature
+from etc_engine.engines.lattice.flux import halo_flux, probe
+from etc_engine.engines.lattice.homogenize import composite_lattice, dense_packing, node_conductivities
+from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
+from etc_engine.engines.lattice.steady import conductivity_tensor, solve_between_walls, solve_with_gradient
+from etc_engine.engines.lattice.transient import heat_system
+from etc_engine.medium.composite import Composite
+from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.solvers.marching import march
-from etc_engine.walls import FixedTemperature
 
 LENGTH = 0.1
 STEEL = {"k": 33.0, "rho_c": 7800.0 * 0.9}  # Table 1

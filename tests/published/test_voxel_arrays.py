@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
+from etc_engine.engines.voxel import homogenize_voxel
+from etc_engine.medium.composite import Composite
 from etc_engine.models.arrays import simple_cubic, square_array
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.voxel import homogenize_voxel
 
 SQUARE = [(0.1, 7.7, 1.16687750), (0.3, 2.0, 1.22229023), (0.3, 7.7, 1.60204759), (0.5, 7.7, 2.27600343)]
 CUBIC = [(0.3, 7.7, 1.7967699), (0.4, 7.7, 2.2026725)]

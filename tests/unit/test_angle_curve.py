@@ -9,14 +9,14 @@ import pytest
 from scipy.linalg import eigh
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts
-from etc_engine.dtem import angle_curve
-from etc_engine.dtem.angle_curve import solve_angle_curve
-from etc_engine.dtem.element import Material, smallest_ratio
-from etc_engine.dtem.methods import find_method
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.steady import solve_steady
-from etc_engine.effective import conductivity_curve, effective_conductivity
+from etc_engine.engines.dtem import angle_curve
+from etc_engine.engines.dtem.angle_curve import solve_angle_curve
+from etc_engine.engines.dtem.effective import conductivity_curve, effective_conductivity
+from etc_engine.engines.dtem.element import Material, smallest_ratio
+from etc_engine.engines.dtem.methods import find_method
+from etc_engine.engines.dtem.steady import solve_steady
+from etc_engine.medium.rules import bonded_contacts
+from etc_engine.medium.sides import contact_sides
 from etc_engine.packing import PackingSpec, pack, parse_radii
 from etc_engine.packing.particles import ParticlePacking
 
@@ -164,7 +164,7 @@ def test_the_bits_do_not_depend_on_the_number_of_threads():
     script = """
 import numpy as np
 from etc_engine import Box, PackingSpec, bonded_contacts, pack, parse_radii
-from etc_engine.dtem.angle_curve import solve_angle_curve
+from etc_engine.engines.dtem.angle_curve import solve_angle_curve
 spec = PackingSpec("advancing-front", parse_radii("uniform:0.006:0.012"), Box((1.0, 1.0)), radius_growth=False)
 network = bonded_contacts(pack(spec, np.random.default_rng(313)), 0.1)
 for index, solution in solve_angle_curve(network, (0,), [0.02, 0.05, 0.1, 0.15, 0.2]):

@@ -11,8 +11,8 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from etc_engine.batch import lock
-from etc_engine.batch.lock import SILENCE, Holder, Lock, held_by
+from etc_engine.durable import lock
+from etc_engine.durable.lock import SILENCE, Holder, Lock, held_by
 from etc_engine.errors import OutputError
 
 
@@ -39,7 +39,7 @@ def test_a_second_run_is_refused_and_the_end_frees_the_lock(tmp_path):
 
 def test_the_lock_of_a_killed_process_is_stale(tmp_path):
     code = (
-        "import os, pathlib, sys\nfrom etc_engine.batch.lock import Lock\n"
+        "import os, pathlib, sys\nfrom etc_engine.durable.lock import Lock\n"
         "Lock(pathlib.Path(sys.argv[1]), 'killed').__enter__()\nos.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)
@@ -100,7 +100,7 @@ def test_the_holder_shows_signs_of_life_while_python_is_busy(tmp_path, monkeypat
 
 def test_nothing_touches_a_lock_whose_process_was_killed(tmp_path):
     code = (
-        "import os, pathlib, sys\nfrom etc_engine.batch import lock\nlock.BEAT = 0.02\n"
+        "import os, pathlib, sys\nfrom etc_engine.durable import lock\nlock.BEAT = 0.02\n"
         "lock.Lock(pathlib.Path(sys.argv[1]), 'killed').__enter__()\nos.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)

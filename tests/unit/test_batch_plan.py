@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from etc_engine.batch.plan import (
+from etc_engine.sweep.plan import (
     GROWTH_LIMIT,
     Unit,
     density_bits,
@@ -19,7 +19,7 @@ from etc_engine.batch.plan import (
     unit_rng,
     units_to_run,
 )
-from etc_engine.batch.statistics import half_width
+from etc_engine.sweep.statistics import half_width
 
 densities = st.floats(1e-3, 2.0)
 

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from etc_engine.batch import gathering
-from etc_engine.batch.plan import Unit
-from etc_engine.batch.records import Record, decode, encode, failed_realization
-from etc_engine.batch.scheduler import Solo
-from etc_engine.batch.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
-from etc_engine.batch.study import parse_study
-from etc_engine.batch.table import join, tabulate
 from etc_engine.box import Box
 from etc_engine.errors import OutputError
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import Cell, ConductionSpec, ContactSpec, Realization, RealizationSpec, Status
+from etc_engine.study.sweep import parse_study
+from etc_engine.sweep import gathering
+from etc_engine.sweep.plan import Unit
+from etc_engine.sweep.records import Record, decode, encode, failed_realization
+from etc_engine.sweep.scheduler import Solo
+from etc_engine.sweep.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
+from etc_engine.sweep.table import join, tabulate
 
 
 def record(realization: int, value: float = 0.3, message: str = "") -> Record:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from etc_engine.batch.statistics import student_t, summarize
+from etc_engine.sweep.statistics import student_t, summarize
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from etc_engine.batch.stop import Stopped, StopRequest
+from etc_engine.durable.stop import Stopped, StopRequest
 
 
 def swallows() -> str:

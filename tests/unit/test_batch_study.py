@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from etc_engine.batch.study import parse_study, read_study
 from etc_engine.errors import StudyError
+from etc_engine.study.sweep import parse_study, read_study
 
 STUDY = """
 schema = 1

@@ -11,9 +11,9 @@ import time
 
 import pytest
 
-from etc_engine.batch import watch
-from etc_engine.batch.lock import Lock
-from etc_engine.batch.watch import Watch
+from etc_engine.durable import watch
+from etc_engine.durable.lock import Lock
+from etc_engine.durable.watch import Watch
 
 
 def test_a_rank_stays_while_its_run_holds_the_lock(tmp_path):
@@ -53,7 +53,7 @@ def test_the_watch_ends_the_rank(tmp_path, monkeypatch):
 def test_a_rank_whose_launcher_is_killed_leaves(tmp_path):
     """A shell stands in for the launcher; its child would sleep for a minute."""
     code = (
-        "import pathlib, sys, time\nfrom etc_engine.batch import watch\nfrom etc_engine.batch.lock import Lock\n"
+        "import pathlib, sys, time\nfrom etc_engine.durable import watch\nfrom etc_engine.durable.lock import Lock\n"
         "watch.LOOK = 0.05\nfolder = pathlib.Path(sys.argv[1])\n"
         "with Lock(folder, 'mine'), watch.Watch(folder / 'lock', 'mine', launched=True):\n"
         "    (folder / 'ready').touch()\n    time.sleep(60)\n"

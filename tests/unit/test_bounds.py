@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.cut_disk import solve_cut_disk
-from etc_engine.dtem.exact import cut_chords, of_disk
-from etc_engine.dtem.jumps import _least_extension, jump_energies
-from etc_engine.dtem.lune import chord_points
-from etc_engine.dtem.waves import chord_trace, chord_waves, temperature_at
-from etc_engine.effective import conductivity_bounds, effective_conductivity
+from etc_engine.engines.dtem.effective import conductivity_bounds, effective_conductivity
+from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
+from etc_engine.engines.dtem.exact.element import cut_chords, of_disk
+from etc_engine.engines.dtem.exact.jumps import _least_extension, jump_energies
+from etc_engine.engines.dtem.exact.lune import chord_points
+from etc_engine.engines.dtem.exact.waves import chord_trace, chord_waves, temperature_at
 from etc_engine.errors import InputError
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
 
 TRUTH = 0.2787774  # corner-graded finite elements between energy bounds 1e-7 apart

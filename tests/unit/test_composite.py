@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.composite import MATRIX, Composite
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.medium.composite import MATRIX, Composite
 from etc_engine.packing.particles import ParticlePacking
 
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from etc_engine.batch.dataset import open_dataset
-from etc_engine.batch.study import Study, parse_study
 from etc_engine.box import Box
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.errors import StudyError
-from etc_engine.figures import draw_comparison
+from etc_engine.output.figures import draw_comparison
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import CompositeSpec, ConductionSpec, ContactSpec, RealizationSpec, Status, realize
 from etc_engine.service.curve import curve_of
+from etc_engine.study.sweep import Study, parse_study
+from etc_engine.sweep.dataset import open_dataset
 
 STUDY = """
 schema = 1

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
 
 UNIT = Box((1.0, 1.0))

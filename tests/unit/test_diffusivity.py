@@ -5,9 +5,9 @@ import pytest
 from scipy.special import erfc
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts
-from etc_engine.dtem.resistance import chord_resistance
 from etc_engine.errors import InputError
+from etc_engine.laws.disk import chord_resistance
+from etc_engine.medium.rules import bonded_contacts
 from etc_engine.packing import ParticlePacking
 from etc_engine.transient.diffusivity import SHORT, effective_diffusivity, fit_diffusivity, slab_mean
 

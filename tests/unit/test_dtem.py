@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.closed_form import closed_form_elements
-from etc_engine.dtem.element import Material
-from etc_engine.dtem.field import recover_field
-from etc_engine.dtem.resistance import SELF_RESISTANCE, mutual_resistance, self_resistance
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.steady import solve_steady
-from etc_engine.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.closed_form import closed_form_elements
+from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.element import Material
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.laws.disk import SELF_RESISTANCE, mutual_resistance, self_resistance
+from etc_engine.medium.backbone import load_groups
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.percolation import load_groups
 
 
 def random_disks(seed: int, periodic: tuple[bool, bool] = (False, False), count: int = 60) -> ParticlePacking:

@@ -12,21 +12,21 @@ from scipy.linalg import expm
 from scipy.special import jn_zeros, jnp_zeros
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.element import Material
-from etc_engine.dtem.field import recover_field
-from etc_engine.dtem.methods import find_method
-from etc_engine.dtem.resistance import mutual_resistance, self_resistance
-from etc_engine.dtem.sides import ContactSides
-from etc_engine.dtem.steady import solve_steady
-from etc_engine.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
-from etc_engine.dtem.transient import contact_flows, transient_system
+from etc_engine.engines.dtem.element import Material
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.methods import find_method
+from etc_engine.engines.dtem.steady import solve_steady
+from etc_engine.engines.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
+from etc_engine.engines.dtem.transient import contact_flows, transient_system
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.laws.disk import mutual_resistance, self_resistance
+from etc_engine.medium.backbone import find_backbone
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.medium.sides import ContactSides
+from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
-from etc_engine.packing.structure import union_area
-from etc_engine.percolation import find_backbone
 from etc_engine.solvers.marching import SCHEMES, critical_step, march
-from etc_engine.walls import Convective, FixedTemperature, HeatFlux, Insulated
+from etc_engine.structure.union import union_area
 
 DEGREE = np.pi / 180.0
 METHODS = ("chord", "standard", "enhanced", "arc")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import overlap_contacts
-from etc_engine.effective import effective_conductivity
+from etc_engine.engines.dtem.effective import effective_conductivity
 from etc_engine.errors import InputError
-from etc_engine.packing.dumps import count_frames, read_dump, write_dump
-from etc_engine.packing.files import ParticleTable
+from etc_engine.medium.rules import overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.csv_files import ParticleTable
+from etc_engine.particle_files.dumps import count_frames, read_dump, write_dump
 
 BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
 

@@ -7,17 +7,17 @@ from hypothesis import strategies as st
 from scipy.special import gammaln
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.cut_disk import solve_cut_disk
-from etc_engine.dtem.element import Material
-from etc_engine.dtem.exact import edge_exponents, exact_elements
-from etc_engine.dtem.field import recover_field
-from etc_engine.dtem.interior import temperatures_inside
-from etc_engine.dtem.lune import LEVELS, chord_points, log_gamma, mode_weights
-from etc_engine.dtem.resistance import mutual_resistance, self_resistance
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
+from etc_engine.engines.dtem.element import Material
+from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
+from etc_engine.engines.dtem.exact.element import edge_exponents, exact_elements
+from etc_engine.engines.dtem.exact.lune import LEVELS, chord_points, log_gamma, mode_weights
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.interior import temperatures_inside
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.laws.disk import mutual_resistance, self_resistance
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
 
 

@@ -14,9 +14,9 @@ from matplotlib.text import Annotation
 from etc_engine.box import Box
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.errors import OutputError
-from etc_engine.figures import draw_comparison, png, save_packing
-from etc_engine.figures.canvas import spread
-from etc_engine.figures.packing import draw_packing
+from etc_engine.output.figures import draw_comparison, png, save_packing
+from etc_engine.output.figures.canvas import spread
+from etc_engine.output.figures.packing import draw_packing
 from etc_engine.packing.particles import ParticlePacking
 
 STUDY = """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.figures import draw_structure, png
+from etc_engine.output.figures import draw_structure, png
 from etc_engine.packing import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 

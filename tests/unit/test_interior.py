@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
 
-from etc_engine.contacts import overlap_contacts
-from etc_engine.dtem.field import recover_field
-from etc_engine.dtem.interior import temperatures_inside
-from etc_engine.effective import effective_conductivity
+from etc_engine.engines.dtem.effective import effective_conductivity
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.interior import temperatures_inside
+from etc_engine.medium.rules import overlap_contacts
 
 
 @pytest.fixture(scope="module", params=["standard", "enhanced", "chord", "arc"])

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.composite import MATRIX, Composite
+from etc_engine.engines.lattice.fitted import fitted_seeds
+from etc_engine.engines.lattice.homogenize import composite_lattice, homogenize_lattice
+from etc_engine.engines.lattice.phases import find_phases, phase_conductivity
+from etc_engine.engines.voxel.homogenize import homogenize_voxel
 from etc_engine.errors import EtcError, GeometryError, InputError
-from etc_engine.lattice.fitted import fitted_seeds
-from etc_engine.lattice.homogenize import composite_lattice, homogenize_lattice
-from etc_engine.lattice.phases import find_phases, phase_conductivity
-from etc_engine.lattice.tessellation import laguerre_facets
+from etc_engine.medium.composite import MATRIX, Composite
 from etc_engine.models.arrays import fcc, simple_cubic
 from etc_engine.packing.lubachevsky_stillinger import compress
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.voxel.homogenize import homogenize_voxel
+from etc_engine.structure.laguerre import laguerre_facets
 
 CUBE = Box((1.0, 1.0, 1.0), (True, True, True))
 CENTRE = [[0.5, 0.5, 0.5]]

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from etc_engine.box import Box
+from etc_engine.engines.lattice.calibration import calibrate, pack_lattice
+from etc_engine.engines.lattice.flux import flux_moments, halo_flux, mean_flux, near_wall, probe
+from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
+from etc_engine.engines.lattice.steady import FACTORISED, conductivity_tensor, solve_between_walls, solve_with_gradient
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.lattice.calibration import calibrate, pack_lattice
-from etc_engine.lattice.flux import flux_moments, halo_flux, mean_flux, near_wall, probe
-from etc_engine.lattice.network import contact_lattice, laguerre_lattice, link_conductances
-from etc_engine.lattice.steady import FACTORISED, conductivity_tensor, solve_between_walls, solve_with_gradient
 from etc_engine.packing.particles import ParticlePacking
 
 LENGTHS = (1.0, 0.8, 1.2)

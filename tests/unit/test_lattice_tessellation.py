@@ -10,8 +10,8 @@ from scipy.spatial import ConvexHull
 
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError
-from etc_engine.lattice.tessellation import laguerre_facets
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.structure.laguerre import laguerre_facets
 
 BOUNDARIES = [(True, True, True), (False, False, False), (True, False, True)]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from etc_engine.engines.lattice.body import SURFACE, ball_lattice, carve
+from etc_engine.engines.lattice.calibration import pack_lattice
+from etc_engine.engines.lattice.exact import ball_temperature, slab_temperature
+from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
+from etc_engine.engines.lattice.transient import heat_system, safe_step
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.lattice.body import SURFACE, ball_lattice, carve
-from etc_engine.lattice.calibration import pack_lattice
-from etc_engine.lattice.exact import ball_temperature, slab_temperature
-from etc_engine.lattice.network import contact_lattice, laguerre_lattice, link_conductances
-from etc_engine.lattice.transient import heat_system, safe_step
+from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated
 from etc_engine.solvers.marching import critical_step, march
-from etc_engine.walls import Convective, FixedTemperature, HeatFlux, Insulated
 
 K, RHO_C, LENGTH = 33.0, 7800.0 * 0.9, 0.1
 TIMES = (0.0, 0.05, 0.1, 0.2)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import jn_zeros, jnp_zeros
 
-from etc_engine.meshless import ContactArc, heat_disk_through_arcs
-from etc_engine.meshless.contact_heating import arc_resistances
+from etc_engine.engines.meshless import ContactArc, heat_disk_through_arcs
+from etc_engine.engines.meshless.contact_heating import arc_resistances
 
 DEGREE = np.pi / 180.0
 

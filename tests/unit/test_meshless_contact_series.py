@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts
-from etc_engine.dtem.sides import contact_sides
-from etc_engine.dtem.transient import contact_flows, particle_sides, transient_system
+from etc_engine.engines.dtem.transient import contact_flows, particle_sides, transient_system
+from etc_engine.engines.meshless import ContactArc, flow_histories, heat_disk_by_flows, heat_disk_through_arcs
+from etc_engine.engines.pipe.conductances import pipe_conductances
+from etc_engine.engines.pipe.flows import pipe_contact_flows
+from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.engines.pipe.transient import pipe_transient
 from etc_engine.errors import InputError
-from etc_engine.meshless import ContactArc, flow_histories, heat_disk_by_flows, heat_disk_through_arcs
+from etc_engine.medium.rules import bonded_contacts
+from etc_engine.medium.sides import contact_sides
+from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing import ParticlePacking
-from etc_engine.pipe.conductances import pipe_conductances
-from etc_engine.pipe.flows import pipe_contact_flows
-from etc_engine.pipe.steady import pipe_conductivity
-from etc_engine.pipe.transient import pipe_transient
 from etc_engine.solvers.marching import march
-from etc_engine.walls import FixedTemperature
 
 ALPHA = np.radians(15.0)
 WALLS = {"left": FixedTemperature(1.0)}

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.special import iv, kv
 
-from etc_engine.meshless import Disk, Polygon, PolyharmonicSpline, ReverseBasis
-from etc_engine.meshless.domain import boundary_quadrature
-from etc_engine.meshless.fundamental_solutions import fundamental_solutions
-from etc_engine.meshless.nodes import boundary_nodes, interior_nodes
-from etc_engine.meshless.polynomials import monomials, particular_monomials
-from etc_engine.meshless.stepping import FACTORS, StepLibrary, amplification, spectral_radius
-from etc_engine.meshless.trefftz import scaled_bessel, trefftz_functions
+from etc_engine.engines.meshless import Disk, Polygon, PolyharmonicSpline, ReverseBasis
+from etc_engine.engines.meshless.domain import boundary_quadrature
+from etc_engine.engines.meshless.fundamental_solutions import fundamental_solutions
+from etc_engine.engines.meshless.nodes import boundary_nodes, interior_nodes
+from etc_engine.engines.meshless.polynomials import monomials, particular_monomials
+from etc_engine.engines.meshless.stepping import FACTORS, StepLibrary, amplification, spectral_radius
+from etc_engine.engines.meshless.trefftz import scaled_bessel, trefftz_functions
 
 LAMBDAS = [0.2, 0.99, 1.01, 6.0, 45.0, 3.0 + 2.0j, 2.0 + 11.0j]
 L_SHAPE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (-1.0, 1.0)]
@@ -143,8 +143,8 @@ def test_amplification_is_that_of_the_scheme(scheme):
 @pytest.mark.parametrize("order", [2, 5])
 def test_spectral_radius_of_large_systems_is_that_of_small_ones(scheme, order, monkeypatch):
     # order 5 on graded nodes marches unstably, partly through negative eigenvalues inside the unit circle
-    from etc_engine.meshless import Dirichlet, Discretization, HeatProblem, stepping
-    from etc_engine.meshless.discretization import lay_out
+    from etc_engine.engines.meshless import Dirichlet, Discretization, HeatProblem, stepping
+    from etc_engine.engines.meshless.discretization import lay_out
 
     problem = HeatProblem(
         vertices=L_SHAPE, conductivity=1.0, heat_capacity=1.0, initial=1.0, boundary=[Dirichlet(0.0)] * 6

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from etc_engine.errors import ConvergenceError, GeometryError, InputError
-from etc_engine.meshless import (
+from etc_engine.engines.meshless import (
     ContactArc,
     Convective,
     Dirichlet,
@@ -18,6 +17,7 @@ from etc_engine.meshless import (
     heat_disk_through_arcs,
     solve_transient,
 )
+from etc_engine.errors import ConvergenceError, GeometryError, InputError
 
 UNIT = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 L_SHAPE = [(-1.0, -1.0), (1.0, -1.0), (1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (-1.0, 1.0)]

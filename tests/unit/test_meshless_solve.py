@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0, j1
 
-from etc_engine.meshless import (
+from etc_engine.engines.meshless import (
     Convective,
     Dirichlet,
     Discretization,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.model_error import chord_error_estimate, chord_error_terms
-from etc_engine.effective import effective_conductivity
+from etc_engine.engines.dtem.effective import effective_conductivity
+from etc_engine.engines.dtem.model_error import chord_error_estimate, chord_error_terms
 from etc_engine.errors import InputError
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.packing import PackingSpec, pack
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.radii import parse_radii

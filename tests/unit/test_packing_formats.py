@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.errors import EtcError, InputError
-from etc_engine.packing.files import ParticleTable
-from etc_engine.packing.formats import format_to_read, format_to_write, read_particles, write_particles
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.csv_files import ParticleTable
+from etc_engine.particle_files.formats import format_to_read, format_to_write, read_particles, write_particles
 
 ENDINGS = ("csv", "dump", "lammpstrj", "nc", "vtp")
 
@@ -96,7 +96,7 @@ def test_box_and_frame_go_with_their_formats(tmp_path):
     ("drop", "words"), [("box", "'box' and 'periodic' are missing"), ("radius", "found no radius")]
 )
 def test_netcdf_without_a_packing_is_refused(tmp_path, drop, words):
-    from etc_engine.packing.netcdf import packing_dataset
+    from etc_engine.particle_files.netcdf import packing_dataset
 
     dataset = packing_dataset(ParticleTable(ParticlePacking([[0.5, 0.5]], [0.1], Box((1.0, 1.0)))))
     if drop in dataset:
@@ -122,6 +122,8 @@ def test_broken_files_are_refused_in_one_line_and_silence(tmp_path, capfd, conte
 
 
 def test_formats_load_neither_xarray_nor_vtk_before_they_are_needed():
-    code = "import sys, etc_engine.packing.formats\nprint({'xarray', 'netCDF4', 'vtkmodules'} & set(sys.modules))"
+    code = (
+        "import sys, etc_engine.particle_files.formats\nprint({'xarray', 'netCDF4', 'vtkmodules'} & set(sys.modules))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError
-from etc_engine.packing import ParticlePacking, neighbor_pairs, solid_fraction
+from etc_engine.packing import ParticlePacking, neighbor_pairs
 from etc_engine.packing.hard_spheres import make_gas, run, start_lists
 from etc_engine.packing.lubachevsky_stillinger import compress
-from etc_engine.packing.statistics import (
+from etc_engine.structure.statistics import (
     contact_directions,
     contact_half_angles,
     coordination_numbers,
@@ -21,6 +21,7 @@ from etc_engine.packing.statistics import (
     pair_correlation,
     two_point_probability,
 )
+from etc_engine.structure.union import solid_fraction
 
 
 @pytest.fixture(scope="module")

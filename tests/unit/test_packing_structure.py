@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.packing.structure import solid_fraction, union_area, union_volume
+from etc_engine.structure.union import solid_fraction, union_area, union_volume
 
 
 def lens(d, r, s):

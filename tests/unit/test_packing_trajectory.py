@@ -5,9 +5,9 @@ import pytest
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError
-from etc_engine.packing.dumps import read_trajectory, write_trajectory
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.packing.trajectory import Trajectory
+from etc_engine.particle_files.dumps import read_trajectory, write_trajectory
+from etc_engine.particle_files.trajectory import Trajectory
 
 HEAD = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS pp ff pp\n0 {length}\n0 1\n-0.5 0.5\n"
 

@@ -6,10 +6,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from etc_engine.box import Box
-from etc_engine.contacts import ContactNetwork, bonded_contacts
-from etc_engine.dtem.steady import solve_steady
+from etc_engine.engines.dtem.steady import solve_steady
+from etc_engine.medium.backbone import find_backbone
+from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.rules import bonded_contacts
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.percolation import find_backbone
 
 
 def square_lattice(n: int, keep: np.ndarray, periodic: tuple[bool, bool]) -> ParticlePacking:

@@ -5,15 +5,15 @@ import pytest
 from scipy.sparse.csgraph import connected_components
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.resistance import chord_resistance, standard_resistance
-from etc_engine.effective import effective_conductivity, mean_field_conductivity
+from etc_engine.engines.dtem.effective import effective_conductivity, mean_field_conductivity
+from etc_engine.engines.pipe.conductances import pipe_conductances
+from etc_engine.engines.pipe.field import pipe_field
+from etc_engine.engines.pipe.steady import pipe_conductivity, solve_pipe
 from etc_engine.errors import ConvergenceError, GeometryError, InputError
+from etc_engine.laws.disk import chord_resistance, standard_resistance
+from etc_engine.medium.conductivity import check_balance
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
-from etc_engine.pipe.conductances import pipe_conductances
-from etc_engine.pipe.field import pipe_field
-from etc_engine.pipe.steady import pipe_conductivity, solve_pipe
-from etc_engine.tensor import check_balance
 
 
 @pytest.fixture(scope="module")

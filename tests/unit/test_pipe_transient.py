@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from etc_engine.box import Box
-from etc_engine.contacts import bonded_contacts, overlap_contacts
-from etc_engine.dtem.resistance import chord_resistance
+from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.engines.pipe.transient import pipe_transient
 from etc_engine.errors import InputError
+from etc_engine.laws.disk import chord_resistance
+from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
-from etc_engine.packing.structure import union_area
-from etc_engine.pipe.steady import pipe_conductivity
-from etc_engine.pipe.transient import pipe_transient
 from etc_engine.solvers.marching import SCHEMES, critical_step, march
-from etc_engine.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable
+from etc_engine.structure.union import union_area
 
 ALPHA = 0.15
 

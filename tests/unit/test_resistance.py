@@ -5,7 +5,8 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.integrate import quad
 
-from etc_engine.dtem.resistance import (
+from etc_engine.errors import InputError
+from etc_engine.laws.disk import (
     chord_resistance,
     clausen_c3,
     enhanced_resistance,
@@ -13,7 +14,6 @@ from etc_engine.dtem.resistance import (
     self_resistance,
     standard_resistance,
 )
-from etc_engine.errors import InputError
 
 
 def double_quadrature(separation: float, a: float, b: float, points: int = 40) -> float:

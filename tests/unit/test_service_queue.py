@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from etc_engine.batch.study import parse_study
 from etc_engine.errors import InputError, OutputError, StudyError
 from etc_engine.service.admission import apply, expected_particles, field_of, study_id, toml_of
 from etc_engine.service.processes import ProcessIdentity
 from etc_engine.service.queue import Queue
 from etc_engine.service.settings import Limits
+from etc_engine.study.sweep import parse_study
 
 STUDY = """schema = 1
 name = "queued"

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.contacts import overlap_contacts
-from etc_engine.dtem.storage import stored_areas
-from etc_engine.dtem.transient import transient_system
+from etc_engine.engines.dtem.storage import stored_areas
+from etc_engine.engines.dtem.transient import transient_system
+from etc_engine.engines.pipe.conductances import pipe_conductances
+from etc_engine.engines.pipe.transient import pipe_transient
 from etc_engine.errors import InputError
+from etc_engine.medium.rules import overlap_contacts
+from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.packing.trajectory import Trajectory
-from etc_engine.pipe.conductances import pipe_conductances
-from etc_engine.pipe.transient import pipe_transient
+from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.solvers.marching import SCHEMES, march
 from etc_engine.transient.moving import ThermalExpansion, march_trajectory
-from etc_engine.walls import FixedTemperature
 
 
 def pipes(network, capacities, walls=None, **more):

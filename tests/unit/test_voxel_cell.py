@@ -8,15 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
+from etc_engine.engines.voxel import homogenize_voxel, solve_cell, voxelize
+from etc_engine.engines.voxel.cell import _solve_fluxes
+from etc_engine.engines.voxel.conductivity import voxel_conductivity
+from etc_engine.engines.voxel.green import GREEN_OPERATORS, gradient_projection
 from etc_engine.errors import ConvergenceError, InputError
+from etc_engine.medium.composite import Composite
 from etc_engine.models.arrays import square_array
 from etc_engine.models.bounds import parallel, series
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.voxel import homogenize_voxel, solve_cell, voxelize
-from etc_engine.voxel.cell import _solve_fluxes
-from etc_engine.voxel.conductivity import voxel_conductivity
-from etc_engine.voxel.green import GREEN_OPERATORS, gradient_projection
 
 CELL_2D, CELL_3D = (1.0, 0.7), (1.0, 0.8, 0.6)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
+from etc_engine.engines.voxel import solve_cell
+from etc_engine.engines.voxel.section import sample, solve_section, temperature_between_walls
 from etc_engine.errors import InputError
-from etc_engine.figures.canvas import png
-from etc_engine.figures.voxel import draw_section
+from etc_engine.medium.composite import Composite
+from etc_engine.output.figures.canvas import png
+from etc_engine.output.figures.voxel import draw_section
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.voxel import solve_cell
-from etc_engine.voxel.section import sample, solve_section, temperature_between_walls
 
 
 def disk(inclusion: float, radius: float = 0.3, periodic: bool = True) -> Composite:

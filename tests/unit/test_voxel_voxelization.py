@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad
 
 from etc_engine.box import Box
-from etc_engine.composite import Composite
+from etc_engine.engines.voxel import voxelize
+from etc_engine.engines.voxel.fractions import ball_in_box
+from etc_engine.engines.voxel.voxelization import check_resolution
 from etc_engine.errors import InputError
+from etc_engine.medium.composite import Composite
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.voxel import voxelize
-from etc_engine.voxel.fractions import ball_in_box
-from etc_engine.voxel.voxelization import check_resolution
 
 coordinates = st.floats(-1.2, 1.2)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from etc_engine.errors import InputError
-from etc_engine.walls import Convective, FixedTemperature, HeatFlux, TimeTable
+from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, TimeTable
 
 
 def test_values_are_numbers_tables_or_functions():

@@ -1,0 +1,1 @@
+"""The discrete thermal element method: disks as elements, contacts as nodes."""

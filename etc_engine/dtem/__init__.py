@@ -1,1 +1,0 @@
-"""The discrete thermal element method: disks as elements, contacts as nodes."""

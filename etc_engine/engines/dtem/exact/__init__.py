@@ -1,0 +1,1 @@
+"""Method ``exact``: the flux resolved over every contact chord of the true cut disk."""

@@ -1,0 +1,132 @@
+r"""What ``chord`` is estimated to miss, from its own heat flows.
+
+``chord`` is exact for one chord and a far source. Heat that passes a disk along its other contacts finds a segment
+cut away there, the flux through a contact is not the uniform one of the mutual resistances, and the temperatures on
+the two sides of a contact differ in slope. With the half-chord a_i = sin alpha_i in radii, half the angle
+t_ij = (theta_i - theta_j)/2 between two contacts, and G_i = sum_j Q_j cot(t_ij)/(2 pi kappa) the slope of the
+temperature along contact i,
+
+    S = sum_i kappa G_i^2 a_i^3 (1 + 7 a_i^4)                                 (segments),
+    M = -sum_(i /= j) Q_i Q_j (a_i^2 + a_j^2) cot^2(t_ij)/(4 pi kappa)        (moments of the flux),
+    J = sum_contacts pi/4 <kappa> (G_A a_A + G_B a_B)^2                       (slopes; <kappa> the harmonic mean),
+
+the relative error of the conductivity is (c_S S + c_M M - c_J J)/E, E the energy. Where all of them vanish, as in
+a straight row, about sin^4(alpha)/500 is left.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from etc_engine.engines.dtem.steady import SteadySolution
+from etc_engine.errors import InputError
+from etc_engine.medium.sides import ContactSides
+
+COEFFICIENTS = (0.706, -0.070, 1.288)
+"""c_S, c_M, c_J: least squares over ``exact`` solutions of lattices and random packings (studies/accuracy)."""
+ALLOWANCE = 0.25
+"""Part of the single terms added to their sum, for what the fit leaves."""
+
+
+LEAST = 0.002
+"""What sin^4 alpha is multiplied with, averaged over the contacts with their heat flows."""
+
+
+def chord_error_terms(solution: SteadySolution, load: int = 0) -> NDArray[np.float64]:
+    """S, M and J over the energy, shape (3,).
+
+    Parameters
+    ----------
+    solution : SteadySolution
+        Of method ``chord``.
+    load : int
+    """
+    sides, energy = solution.sides, float(solution.energies[load, load])
+    if energy == 0.0:
+        return np.zeros(3)
+    kappa = solution.material.conductivity
+    slopes = np.zeros(sides.nodes.size)
+    flows = np.ascontiguousarray(solution.heat_flows[:, load])
+    terms = np.array(_terms(sides.offsets, sides.theta, sides.alpha, flows, kappa, slopes))
+    return np.append(terms, _slope_term(sides, kappa, slopes)) / energy
+
+
+def _slope_term(sides: ContactSides, kappa: NDArray[np.float64], slopes: NDArray[np.float64]) -> float:
+    """J: an isothermal wall counts as a mirror image of infinite conductivity."""
+    own = kappa[sides.particles]
+    a, b = own[sides.of_contacts].T
+    across = slopes[sides.of_contacts].sum(axis=1)
+    at_walls = sides.of_walls
+    inner = (a * b / (a + b) * across**2).sum()
+    return float(0.5 * np.pi * (inner + (own[at_walls] * slopes[at_walls] ** 2).sum()))
+
+
+def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
+    """Estimated relative error of the conductivity by method ``chord``, in magnitude.
+
+    |s + m - j| + (|s| + |m| + |j|)/4 + <sin^4 alpha>/500 with s = c_S S/E, m = c_M M/E, j = c_J J/E.
+
+    Parameters
+    ----------
+    solution : SteadySolution
+        Of method ``chord``.
+    load : int
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        If the method is another one.
+
+    Notes
+    -----
+    An estimate, not a bound: method ``exact`` gives bounds. The disks cut off by insulated walls, and dead ends, which
+    ``chord`` leaves out, are not in it.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.rules import bonded_contacts
+    >>> from etc_engine.engines.dtem.steady import solve_steady
+    >>> from etc_engine.packing.particles import ParticlePacking
+    >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
+    >>> round(chord_error_estimate(solve_steady(bonded_contacts(disk, 0.35), (0, 1))), 3)
+    0.005
+    """
+    if solution.method != "chord":
+        raise InputError(f"the error is estimated for method chord, found a solution by {solution.method}")
+    parts = np.multiply(COEFFICIENTS, chord_error_terms(solution, load)) * [1.0, 1.0, -1.0]
+    flows = np.abs(solution.heat_flows[:, load])
+    rest = LEAST * (flows @ np.sin(solution.sides.alpha) ** 4) / max(float(flows.sum()), np.finfo(float).tiny)
+    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest)
+
+
+@njit(cache=True)
+def _terms(
+    offsets: NDArray[np.int64],
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    flows: NDArray[np.float64],
+    conductivity: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+) -> tuple[float, float]:
+    """S and M; the slopes G a of all sides into ``slopes``."""
+    segments, moments = 0.0, 0.0
+    for p in range(offsets.size - 1):
+        for i in range(offsets[p], offsets[p + 1]):
+            slope = 0.0
+            for j in range(offsets[p], offsets[p + 1]):
+                if i != j:
+                    cot = 1.0 / np.tan(0.5 * (theta[i] - theta[j]))
+                    squares = np.sin(alpha[i]) ** 2 + np.sin(alpha[j]) ** 2
+                    slope += 0.5 * flows[j] * cot
+                    moments -= flows[i] * flows[j] * squares * cot * cot / (4.0 * np.pi * conductivity[p])
+            slopes[i] = slope * np.sin(alpha[i]) / (np.pi * conductivity[p])
+            a = np.sin(alpha[i])
+            segments += conductivity[p] * slopes[i] ** 2 * a * (1.0 + 7.0 * a**4)
+    return segments, moments

@@ -1,0 +1,236 @@
+r"""The disk as an element that stores heat: its contacts are nodes, and so is its mean temperature.
+
+**Mean temperature.** A disk of radius R warms at one rate everywhere. Its heat flows no longer cancel: with
+S = sum_j Q_j = rho c V dT_o/dt,
+
+    kappa Lap T = S / (pi R^2),      T = S r^2 / (4 pi R^2 kappa) + w,      Lap w = 0.
+
+The first part leads S out of the rim evenly, so that w carries the rest of the flux, which sums to zero. Its value at
+the rim is S/(4 pi kappa), its mean over the disk S/(8 pi kappa). The harmonic part follows from the flux by the kernel
+-ln|2 sin(x/2)|/(pi kappa), which has no mean: it ignores the even part of the flux, and its own mean over the disk is
+zero. Averaged over the arcs,
+
+    T_i - T_o = sum_j h'_ij Q_j + S / (8 pi kappa),
+
+where h' is h without its ln 2. Hence Q = A (T_c - T_o e) with A = (H' + e e^T/(8 pi kappa))^-1, and the element
+
+    [ Q ]   [  A       -A e    ] [ T_c ]
+    [-S ] = [ -e^T A    e^T A e] [ T_o ]
+
+is symmetric, positive semi-definite and blind to a common temperature. At rest, S = 0, it is the steady element.
+
+**Dipoles.** What is left out decays slowest where the temperature varies as cos(angle) and sin(angle): that part
+follows a change of flux only after R^2 rho c/kappa. Let the storage have such a part too, rho c dT/dt = s r cos(angle).
+Then
+
+    kappa Lap T = s r cos  =>  T = [s r^3/(8 kappa) + b r] cos,   flux q = 3 s R^2/8 + kappa b,
+
+and with D the amplitude at the rim of the linear field that fits T best, D = 4/(pi R^3) int T r cos dA,
+
+    D = (R/kappa) (q - 7 s R^2/24),      T(R) = (6/7) D + (1/7) q R/kappa,      dD/dt = s R/(rho c).
+
+The flux of the contacts has q = u . Q/(pi R), u_i the mean of cos(angle) over arc i, and H' holds the quasi-steady
+answer u u^T/(pi kappa) of this harmonic. Taking 6/7 of it away and giving it to the state D makes
+
+    T_c = T_o e + (6/7)(D_c u + D_s v) + H'' Q,      H'' = H' + e e^T/(8 pi kappa) - (6/7)(u u^T + v v^T)/(pi kappa),
+    (rho c V/4) dD_c/dt = (6/7) u . Q - (6/7) pi kappa D_c,     likewise D_s with v,
+
+symmetric again. It relaxes at the rate 24/7 = 3.429 kappa/(rho c R^2), where the disk's own is j'_11^2 = 3.390.
+
+**States as temperatures.** The mean and the dipoles are those of three thirds of the disk at angles 0, 120 and 240
+degrees,
+
+    T_k = T_o + (D_c cos phi_k + D_s sin phi_k)/sqrt(2),      each of the heat capacity rho c V/3:
+
+the capacity stays diagonal, the heat is 1 . C T, and a common temperature is still one without flow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from etc_engine.engines.dtem.element import Elements, Material, cholesky_inverse, packed_starts
+from etc_engine.engines.dtem.methods import find_method, flux_modes
+from etc_engine.errors import GeometryError, InputError
+from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.sides import ContactSides
+
+SHARE = 6.0 / 7.0
+"""Part of the rim's first harmonic that follows the dipole; the rest follows the flux at once."""
+_ANGLES = 2.0 * np.pi * np.arange(3) / 3.0
+_AROUND = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+FROM_THIRDS = np.concatenate([np.full((1, 3), 1.0 / 3.0), np.sqrt(8.0) / 3.0 * _AROUND])
+"""(T_o, D_c, D_s) of the temperatures of the three thirds, shape (3, 3)."""
+
+
+def storing_elements(
+    sides: ContactSides, material: Material, method: str, *, dipoles: bool = False, modes: int | None = None
+) -> Elements:
+    """Elements of all disks over their contacts and their states, which are temperatures that store heat.
+
+    Parameters
+    ----------
+    sides : ContactSides
+    material : Material
+    method : str
+        A name of `etc_engine.engines.dtem.methods.METHODS`, but for ``exact``.
+    dipoles : bool
+        Three states a particle, its thirds; otherwise one, its mean.
+    modes : int, optional
+        Flux modes of a contact, with ``arc``.
+
+    Returns
+    -------
+    Elements
+        Rows of a particle: its contacts, modes fastest, then its states. Nodes: M times the contact plus the mode, and
+        after all contacts the states by particle. ``modes`` is M. ``apply`` answers the heat into the particle at
+        the contacts, and what the states lose.
+
+    Raises
+    ------
+    GeometryError
+        If H' + e e^T/(8 pi kappa), or H'' with dipoles, of a disk is not positive definite.
+    InputError
+        If the method has no such form.
+    """
+    variant, modes = find_method(method), flux_modes(method, modes)
+    if variant.resistances is None:
+        raise InputError(f"method {method} has no transient form: choose chord, arc, standard or enhanced")
+    h = variant.resistances(sides, material, modes)
+    states = 3 if dipoles else 1
+    count = sides.offsets.size - 1
+    contact_rows = modes * np.diff(sides.offsets)
+    offsets = np.concatenate([[0], np.cumsum(contact_rows + states)])
+    starts = packed_starts(offsets)
+    values = np.zeros(int(starts[-1]))
+    bad = _fill(
+        modes * sides.offsets,
+        h.starts,
+        h.values,
+        h.moments,
+        modes,
+        material.conductivity,
+        FROM_THIRDS if dipoles else np.ones((1, 1)),
+        starts,
+        values,
+    )
+    if bad >= 0:
+        raise GeometryError(_indefinite(bad, sides, method, dipoles))
+    size = modes * (sides.nodes.max(initial=-1) + 1)
+    nodes = np.empty(int(offsets[-1]), dtype=np.int64)
+    is_state = np.ones(nodes.size, dtype=np.bool_)
+    shift = states * np.repeat(np.arange(count), contact_rows)
+    at = np.arange(modes * sides.nodes.size) + shift
+    is_state[at] = False
+    nodes[at] = (modes * sides.nodes[:, None] + np.arange(modes)).ravel()
+    nodes[is_state] = size + np.arange(states * count)
+    return Elements(modes, offsets, nodes, starts, values)
+
+
+def _indefinite(particle: int, sides: ContactSides, method: str, dipoles: bool) -> str:
+    own = slice(sides.offsets[particle], sides.offsets[particle + 1])
+    widest = np.degrees(sides.alpha[own].max())
+    cure = "leave the dipoles out, use smaller contact angles" if dipoles else "use smaller contact angles"
+    return (
+        f"particle {particle} with {own.stop - own.start} contact(s) of half-angles up to {widest:.4g} degrees has no "
+        f"positive definite resistance to heat that it stores (method {method}"
+        f"{', with dipoles' if dipoles else ''}): {cure} or, if that is the geometry, method standard"
+    )
+
+
+def stored_areas(network: ContactNetwork, method: str) -> NDArray[np.float64]:
+    """Area of each disk that stores heat, its volume per unit thickness, shape (n,) [m2].
+
+    V = pi R^2 - sum_i R^2 (alpha_i - sin alpha_i cos alpha_i) over the contacts that cut the disk.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+    method : str
+
+    Notes
+    -----
+    Geometric contacts, walls of all kinds included, cut the disk at their chords; so do prescribed ones with ``chord``.
+    With the other methods prescribed arcs cut nothing off. Segments are taken for disjoint, as contact arcs must be.
+    """
+    radii = network.packing.radii
+    areas = np.pi * radii**2
+    if network.geometric or method == "chord":
+        owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
+        alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
+        segments = alpha - np.sin(alpha) * np.cos(alpha)
+        areas -= radii**2 * np.bincount(owner, segments, minlength=radii.size)
+    return np.asarray(areas)
+
+
+@njit(cache=True)
+def _fill(
+    offsets: NDArray[np.int64],
+    h_starts: NDArray[np.int64],
+    h_values: NDArray[np.float64],
+    moments: NDArray[np.float64],
+    modes: int,
+    conductivity: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    values: NDArray[np.float64],
+) -> int:
+    """Fill the packed matrices; answers the first particle without a positive definite one, or -1.
+
+    ``readings`` turns the states into (T_o) or (T_o, D_c, D_s).
+    """
+    states = readings.shape[0]
+    for p in range(offsets.size - 1):
+        first, n = offsets[p], offsets[p + 1] - offsets[p]
+        a = h_values[h_starts[p] : h_starts[p + 1]].copy().reshape((n, n))
+        scale = 1.0 / (np.pi * conductivity[p])
+        g = np.zeros((n, states))  # temperature of each row by the states alone
+        for i in range(n):
+            if i % modes == 0:
+                for k in range(states):
+                    g[i, k] += readings[0, k]
+            for d in range(1, states):
+                for k in range(states):
+                    g[i, k] += SHARE * moments[first + i, d - 1] * readings[d, k]
+            for j in range(n):
+                if i % modes == 0 and j % modes == 0:
+                    a[i, j] += (0.125 - np.log(2.0)) * scale
+                for d in range(states - 1):
+                    a[i, j] -= SHARE * scale * moments[first + i, d] * moments[first + j, d]
+        if not cholesky_inverse(a, n):
+            return p
+        _join(a, g, readings, SHARE / scale, values[starts[p] : starts[p + 1]])
+    return -1
+
+
+@njit(cache=True)
+def _join(
+    a: NDArray[np.float64],
+    g: NDArray[np.float64],
+    readings: NDArray[np.float64],
+    relaxation: float,
+    out: NDArray[np.float64],
+) -> None:
+    """The element [A, -A G; -G^T A, G^T A G + W^T w W], row by row into ``out``; W reads the dipoles."""
+    n, states = g.shape
+    size = n + states
+    for i in range(n):
+        for j in range(n):
+            out[i * size + j] = a[i, j]
+        for k in range(states):
+            value = 0.0
+            for j in range(n):
+                value -= a[i, j] * g[j, k]
+            out[i * size + n + k] = value
+            out[(n + k) * size + i] = value
+    for k in range(states):
+        for l in range(k + 1):
+            value = 0.0
+            for i in range(n):
+                value -= g[i, k] * out[i * size + n + l]
+            for d in range(1, states):
+                value += relaxation * readings[d, k] * readings[d, l]
+            out[(n + k) * size + n + l] = value
+            out[(n + l) * size + n + k] = value

@@ -1,0 +1,264 @@
+"""Which contacts can carry a steady heat flow: clusters, spanning, rattlers and dead ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from etc_engine.box import Box
+from etc_engine.medium.network import ContactNetwork
+
+
+@dataclass(frozen=True, eq=False)
+class Backbone:
+    """The part of a contact network that may carry a steady flux.
+
+    Parameters
+    ----------
+    contacts : ndarray of bool, shape (m,)
+        Particle contacts kept.
+    wall_contacts : ndarray of bool, shape (w,)
+        Wall contacts kept: of all those of the network, only ones with a driven wall.
+    clusters : ndarray of int, shape (n,)
+        Connected cluster of each particle, by its lowest row number.
+    spans : tuple of bool
+        For each load axis asked for, whether some cluster spans it (walls) or wraps around it (periodic).
+    """
+
+    contacts: NDArray[np.bool_]
+    wall_contacts: NDArray[np.bool_]
+    clusters: NDArray[np.int64]
+    spans: tuple[bool, ...]
+
+
+def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
+    """Keep the clusters that span a load axis, and prune their dead ends.
+
+    Between walls a cluster spans when it touches both of them; around a periodic box when a path inside
+    it returns to its start displaced by a whole box. Particles left with a single contact carry no steady
+    flux and are taken away, repeatedly.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+    axes : tuple of int
+        Load axes that share one system: a single walled axis, or periodic axes only.
+
+    Returns
+    -------
+    Backbone
+
+    Notes
+    -----
+    Linear in the number of contacts (union-find with displacements, then a queue of dead ends).
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.rules import bonded_contacts
+    >>> from etc_engine.packing.particles import ParticlePacking
+    >>> box = Box((1.0, 1.0))
+    >>> chain = ParticlePacking([[0.25, 0.5], [0.75, 0.5], [0.75, 0.9]], [0.25, 0.25, 0.1], box)
+    >>> find_backbone(bonded_contacts(chain, 0.1), (0,)).spans
+    (True,)
+    """
+    n = network.packing.count
+    d = network.packing.dimension
+    driven = np.zeros(network.walls.size, dtype=np.bool_)
+    if not network.packing.box.periodic[axes[0]]:
+        driven[network.walls_of(axes[0])] = True
+    clusters, winding = _clusters(n, network.pairs, network.shifts)
+    if network.packing.box.periodic[axes[0]]:
+        spanning = winding[:, list(axes)]
+    else:
+        touches = np.zeros((n, 2 * d), dtype=np.bool_)
+        touches[clusters[network.wall_particles], network.walls] = True
+        low, high = 2 * axes[0], 2 * axes[0] + 1
+        spanning = (touches[:, low] & touches[:, high])[:, None]
+    spans = tuple(bool(column.any()) for column in spanning.T)
+    in_play = np.asarray(spanning.any(axis=1))[clusters]
+    kept = _prune(in_play, network.pairs, network.wall_particles[driven])
+    contacts = kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
+    wall_contacts = driven & kept[network.wall_particles]
+    return Backbone(contacts, wall_contacts, clusters, spans)
+
+
+def restore_dead_ends(network: ContactNetwork, backbone: Backbone) -> Backbone:
+    """The same backbone with the dead ends of its clusters.
+
+    They pass on no heat, but a contact resolved over its width sees some of it turn back in them.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+    backbone : Backbone
+        Of this network.
+    """
+    ends, walls = network.pairs[:, 0], network.wall_particles
+    in_play = np.zeros(network.packing.count, dtype=np.bool_)
+    in_play[backbone.clusters[ends[backbone.contacts]]] = True
+    in_play[backbone.clusters[walls[backbone.wall_contacts]]] = True
+    driven_walls = np.isin(network.walls, network.walls[backbone.wall_contacts])
+    return replace(
+        backbone,
+        contacts=in_play[backbone.clusters[ends]],
+        wall_contacts=driven_walls & in_play[backbone.clusters[walls]],
+    )
+
+
+def joined_axes(
+    n: int,
+    pairs: NDArray[np.int64],
+    shifts: NDArray[np.int64],
+    wall_nodes: NDArray[np.int64],
+    walls: NDArray[np.int64],
+    box: Box,
+) -> tuple[int, ...]:
+    """Axes along which linked nodes join: wrap around the box, or touch both of its walls.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes.
+    pairs : ndarray of int, shape (m, 2)
+        Linked nodes.
+    shifts : ndarray of int, shape (m, d)
+        The image of j linked to i lies at ``x_j + shift * lengths``.
+    wall_nodes, walls : ndarray of int, shape (w,)
+        Node and wall of each link to a wall; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end.
+    box : Box
+
+    Returns
+    -------
+    tuple of int
+
+    Examples
+    --------
+    >>> none = np.zeros(0, dtype=np.int64)
+    >>> joined_axes(1, np.array([[0, 0]]), np.array([[1, 0]]), none, none, Box((1.0, 1.0), (True, True)))
+    (0,)
+    """
+    clusters, winding = _clusters(n, pairs, shifts)
+    touches = np.zeros((n, 2 * box.dimension), dtype=np.bool_)
+    touches[clusters[wall_nodes], walls] = True
+    spanning = np.where(box.periodic, winding, touches[:, 0::2] & touches[:, 1::2])
+    return tuple(int(axis) for axis in np.flatnonzero(spanning.any(axis=0)))
+
+
+def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
+    """Load axes that share a matrix: each walled axis alone, all periodic axes together if no axis is walled.
+
+    Beside a walled axis a periodic one has a system of its own too, because the walls drive only their axis.
+
+    Examples
+    --------
+    >>> load_groups(Box((1.0, 1.0), (True, True))), load_groups(Box((1.0, 1.0), (False, True)))
+    (((0, 1),), ((0,), (1,)))
+    """
+    periodic = tuple(axis for axis in range(box.dimension) if box.periodic[axis])
+    walled = tuple((axis,) for axis in range(box.dimension) if not box.periodic[axis])
+    return tuple(sorted(walled + ((periodic,) if periodic else ())))
+
+
+def find_backbones(network: ContactNetwork, axes: tuple[int, ...] | None = None) -> dict[tuple[int, ...], Backbone]:
+    """Backbone of every load group; shared by all contact angles and methods on one network."""
+    return {group: find_backbone(network, group) for group in asked_groups(network.packing.box, axes)}
+
+
+def asked_groups(box: Box, axes: tuple[int, ...] | None) -> tuple[tuple[int, ...], ...]:
+    """Load groups that hold one of the axes asked for; all by default."""
+    groups = load_groups(box)
+    return groups if axes is None else tuple(group for group in groups if set(group) & set(axes))
+
+
+@njit(cache=True)
+def _root(parent: NDArray[np.int64], offset: NDArray[np.int64], i: int, displacement: NDArray[np.int64]) -> int:
+    """Root of i; ``displacement`` becomes the boxes between the two (union by size keeps paths short)."""
+    displacement[:] = 0
+    while parent[i] != i:
+        displacement += offset[i]
+        i = parent[i]
+    return i
+
+
+@njit(cache=True)
+def _clusters(
+    n: int, pairs: NDArray[np.int64], shifts: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Cluster label (lowest row) of each particle, and the axes around which each labelled cluster wraps."""
+    d = shifts.shape[1]
+    parent = np.arange(n)
+    size = np.ones(n, dtype=np.int64)
+    offset = np.zeros((n, d), dtype=np.int64)
+    winding = np.zeros((n, d), dtype=np.bool_)
+    of_i, of_j = np.zeros(d, dtype=np.int64), np.zeros(d, dtype=np.int64)
+    for c in range(pairs.shape[0]):
+        a = _root(parent, offset, pairs[c, 0], of_i)
+        b = _root(parent, offset, pairs[c, 1], of_j)
+        step = of_i + shifts[c] - of_j  # displacement of root b from root a along this contact
+        if a == b:
+            winding[a] |= step != 0
+            continue
+        if size[a] < size[b]:
+            a, b, step = b, a, -step
+        parent[b] = a
+        size[a] += size[b]
+        offset[b] = step
+        winding[a] |= winding[b]
+    label = np.full(n, -1, dtype=np.int64)
+    clusters = np.empty(n, dtype=np.int64)
+    wraps = np.zeros((n, d), dtype=np.bool_)
+    for i in range(n):
+        root = _root(parent, offset, i, of_i)
+        if label[root] < 0:
+            label[root] = i
+            wraps[i] = winding[root]
+        clusters[i] = label[root]
+    return clusters, wraps
+
+
+@njit(cache=True)
+def _prune(
+    in_play: NDArray[np.bool_], pairs: NDArray[np.int64], wall_particles: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Particles in play that keep at least two contacts when dead ends are taken away repeatedly."""
+    n, m = in_play.size, pairs.shape[0]
+    start = np.zeros(n + 1, dtype=np.int64)
+    for c in range(m):
+        start[pairs[c, 0] + 1] += 1
+        start[pairs[c, 1] + 1] += 1
+    degree = start[1:].copy()
+    for w in range(wall_particles.size):
+        degree[wall_particles[w]] += 1
+    start = np.cumsum(start)
+    fill = start[:-1].copy()
+    partner = np.empty(2 * m, dtype=np.int64)
+    for c in range(m):
+        i, j = pairs[c, 0], pairs[c, 1]
+        partner[fill[i]] = j
+        fill[i] += 1
+        partner[fill[j]] = i
+        fill[j] += 1
+    kept = in_play.copy()
+    queue = np.empty(n, dtype=np.int64)
+    tail = 0
+    for i in range(n):
+        if kept[i] and degree[i] < 2:
+            kept[i] = False
+            queue[tail] = i
+            tail += 1
+    head = 0
+    while head < tail:
+        i = queue[head]
+        head += 1
+        for s in range(start[i], start[i + 1]):
+            j = partner[s]
+            degree[j] -= 1
+            if kept[j] and degree[j] < 2:
+                kept[j] = False
+                queue[tail] = j
+                tail += 1
+    return kept

@@ -1,0 +1,201 @@
+"""Contact rules: which particles touch, and through how wide a contact. A rule is one function."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.errors import GeometryError, InputError
+from etc_engine.medium.network import ContactNetwork, check_half_angle
+from etc_engine.packing.neighbors import neighbor_pairs
+from etc_engine.packing.particles import ParticlePacking
+
+# An overlap below this part of the mean radius is round-off of a tangency, not a contact.
+ROUND_OFF_OVERLAP = 1e-10
+
+
+def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
+    """Contacts of overlapping particles and of particles that reach over a wall; geometry sets the arcs.
+
+    cos alpha_i = (d^2 + R_i^2 - R_j^2)/(2 d R_i), likewise for j; at a wall cos alpha = distance/R.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+        Overlapping disks or spheres.
+
+    Returns
+    -------
+    ContactNetwork
+
+    Raises
+    ------
+    GeometryError
+        If two centres coincide, a particle lies inside another, or an arc reaches a half-angle of 90 degrees.
+
+    Notes
+    -----
+    Overlaps below 1e-10 of the mean radius are taken for touching points, which conduct nothing.
+
+    References
+    ----------
+    Feng, Han, Li, Owen 2008, section 3.4, doi:10.1016/j.jcp.2008.01.031.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> packing = ParticlePacking([[0.3, 0.5], [0.7, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    >>> overlap_contacts(packing).angles.round(4)
+    array([[0.6435, 0.6435]])
+    """
+    near = neighbor_pairs(packing)
+    radii = packing.radii
+    touching = near.gaps < -ROUND_OFF_OVERLAP * 0.5 * radii[near.pairs].sum(axis=1)
+    pairs, shifts = near.pairs[touching], near.shifts[touching]
+    r_i, r_j = radii[pairs[:, 0]], radii[pairs[:, 1]]
+    distance = (r_i + r_j) + near.gaps[touching]
+    swallowed = distance <= np.abs(r_i - r_j)
+    if swallowed.any():
+        i, j = pairs[np.flatnonzero(swallowed)[0]]
+        raise GeometryError(
+            f"particles {i} and {j}: one lies inside the other (radii {radii[i]:.6g} and {radii[j]:.6g}, centres "
+            f"{distance[swallowed][0]:.6g} apart); remove one of them"
+        )
+    angles = np.stack([_chord_angle(r_i, r_j, distance), _chord_angle(r_j, r_i, distance)], axis=1)
+    wide = angles >= 0.5 * np.pi
+    if wide.any():
+        row, side = (int(v[0]) for v in np.nonzero(wide))
+        raise GeometryError(
+            f"particle {pairs[row, side]} overlaps particle {pairs[row, 1 - side]} so far that the contact half-angle "
+            f"is {np.degrees(angles[row, side]):.2f} degrees; it must be below 90"
+        )
+    wall_particles, walls, wall_distances = _wall_distances(packing, ROUND_OFF_OVERLAP, -1.0)
+    wall_radii = radii[wall_particles]
+    wall_angles = 2.0 * np.arcsin(np.sqrt(np.clip((wall_radii - wall_distances) / (2.0 * wall_radii), 0.0, 1.0)))
+    return ContactNetwork(packing, pairs, shifts, angles, wall_particles, walls, wall_angles, geometric=True)
+
+
+def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float = 1e-6) -> ContactNetwork:
+    """Cemented contacts: every pair closer than a gap is bonded through an arc of prescribed half-angle.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+        Touching, or nearly touching, disks.
+    half_angle : float [rad]
+        Half-angle of every contact arc, 0 < half_angle < pi/2.
+    bond_gap : float
+        Largest bonded gap between two surfaces, in mean radii of the pair (at walls: in radii).
+
+    Returns
+    -------
+    ContactNetwork
+
+    Raises
+    ------
+    InputError
+        If the half-angle or the gap is out of range.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    >>> network = bonded_contacts(packing, 0.1)
+    >>> network.count, network.walls.tolist()
+    (1, [0, 1])
+    """
+    check_half_angle(half_angle)
+    if not (np.isfinite(bond_gap) and bond_gap >= 0.0):
+        raise InputError(f"the bond gap must be a number of mean radii >= 0, found {bond_gap}")
+    near = neighbor_pairs(packing, relative_gap=bond_gap)
+    wall_particles, walls, _ = _wall_distances(packing, bond_gap, 1.0)
+    return ContactNetwork(
+        packing,
+        near.pairs,
+        near.shifts,
+        np.full((near.count, 2), float(half_angle)),
+        wall_particles,
+        walls,
+        np.full(walls.size, float(half_angle)),
+    )
+
+
+def coordination_contacts(packing: ParticlePacking, half_angle: float, coordination: float) -> ContactNetwork:
+    """Bonded contacts of the closest pairs, as many as give a mean coordination number.
+
+    The bond gap is the relative gap of the (Z n / 2)-th closest pair.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+    half_angle : float [rad]
+        Half-angle of every contact arc.
+    coordination : float
+        Mean coordination number Z wanted, met to the nearest contact.
+
+    Returns
+    -------
+    ContactNetwork
+        Walls are bonded within the same gap.
+
+    Raises
+    ------
+    InputError
+        If Z is not positive, or there are not as many pairs within two mean radii.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> packing = ParticlePacking([[0.2, 0.5], [0.5, 0.5], [0.9, 0.5]], [0.1] * 3, Box((1.0, 1.0)))
+    >>> coordination_contacts(packing, 0.1, 2 / 3).pairs.tolist()
+    [[0, 1]]
+    """
+    wanted = round(0.5 * coordination * packing.count) if np.isfinite(coordination) else 0
+    if wanted < 1:
+        raise InputError(f"the mean coordination number must be positive (at least one contact), found {coordination}")
+    for reach in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0):
+        near = neighbor_pairs(packing, relative_gap=reach)
+        if near.count >= wanted:
+            relative = near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))
+            gap = float(np.partition(relative, wanted - 1)[wanted - 1])
+            return bonded_contacts(packing, half_angle, max(gap, 0.0) * (1.0 + 1e-12))
+    raise InputError(
+        f"a mean coordination number of {coordination:g} is out of reach: only {near.count} pairs of "
+        f"{packing.count} particles are closer than two mean radii, {wanted} are needed"
+    )
+
+
+def _chord_angle(
+    radius: NDArray[np.float64], other: NDArray[np.float64], distance: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Half-angle of the common chord seen from the disk of the first radius.
+
+    1 - cos alpha = (R_j - (d - R_i)) (R_j + (d - R_i)) / (2 d R_i), which keeps its digits for a slight overlap.
+    """
+    versine = (other - (distance - radius)) * (other + (distance - radius)) / (2.0 * distance * radius)
+    return 2.0 * np.arcsin(np.sqrt(np.clip(0.5 * versine, 0.0, 1.0)))
+
+
+def _wall_distances(
+    packing: ParticlePacking, gap: float, sign: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Particles whose gap to a wall is at most ``sign * gap`` radii: (particle, wall, distance), wall by wall."""
+    particles: list[NDArray[np.int64]] = []
+    walls: list[NDArray[np.int64]] = []
+    distances: list[NDArray[np.float64]] = []
+    for axis in range(packing.dimension):
+        if packing.box.periodic[axis]:
+            continue
+        for end, distance in enumerate(
+            (packing.centers[:, axis], packing.box.lengths[axis] - packing.centers[:, axis])
+        ):
+            rows = np.flatnonzero(distance - packing.radii <= sign * gap * packing.radii)
+            particles.append(rows)
+            walls.append(np.full(rows.size, 2 * axis + end))
+            distances.append(distance[rows])
+    empty = np.zeros(0, dtype=np.int64)
+    return (
+        np.concatenate([empty, *particles]),
+        np.concatenate([empty, *walls]),
+        np.concatenate([empty.astype(np.float64), *distances]),
+    )

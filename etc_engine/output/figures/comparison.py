@@ -1,0 +1,284 @@
+"""The main figure: simulated conductivity against density or contact angle, with models as thin lines."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, save, spread, style
+
+if TYPE_CHECKING:
+    import xarray
+
+MEAN_FIELD = "contact_mean_field"
+
+MARGIN = 0.25
+"""Room above and below the simulated values of composites, over their range, for the model lines about them."""
+
+DECADES = 1.3
+"""A logarithmic axis is used when the simulated values span more than this many decades."""
+
+VARIANTS = {
+    "contact_angle": "contact half-angle [degree]",
+    "contrast": "conductivity of the particles over that of the matrix [-]",
+}
+"""Labels of the second axis of a sweep."""
+
+BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones"
+
+SHORT = {
+    "series": "series",
+    "parallel": "parallel",
+    "hashin_shtrikman_lower": "HS lower",
+    "hashin_shtrikman_upper": "HS upper",
+    "maxwell": "Maxwell",
+    "maxwell_inverse": "inverse Maxwell",
+    "effective_medium": "Bruggeman, symmetric",
+    "differential": "Bruggeman, differential",
+    "differential_inverse": "Bruggeman, pores in solid",
+    "third_order": "third order",
+    "lewis_nielsen": "Lewis-Nielsen",
+    "agari_uno": "Agari-Uno",
+}
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """The horizontal axis: a dimension of the sweep, and the one whose values have a curve each."""
+
+    dim: str
+    label: str
+    curves: str | None
+
+
+def save_comparison(comparison: xarray.Dataset, lines: xarray.Dataset, path: Path | str) -> None:
+    """Write the figure of a comparison as png, pdf or svg; see `draw_comparison`."""
+    save(draw_comparison(comparison, lines), path)
+
+
+def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure:
+    """Mean conductivity with its confidence band, a curve for each contact angle, and the models.
+
+    Parameters
+    ----------
+    comparison : xarray.Dataset
+        From `etc_engine.comparison.evaluate_models`.
+    lines : xarray.Dataset
+        From `etc_engine.comparison.model_lines`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel a method; if the sweep has one density and several angles, one panel against the angle.
+    """
+    axis = _axis(comparison)
+    panels = _panels(comparison, axis)
+    columns = 2 if len(panels) == 4 else min(len(panels), 3)
+    rows = -(-len(panels) // columns)
+    figure = new_figure(2.2 + 4.6 * columns, 0.8 + 4.0 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    logarithmic = _is_wide(comparison["conductivity_mean"].values)
+    for axes, (title, part) in zip(grid.flat, panels, strict=False):
+        style(axes)
+        if logarithmic:
+            axes.set_yscale("log")
+        if axis.dim in VARIANTS and _is_wide(part[axis.dim].values):
+            axes.set_xscale("log")
+        _draw_simulation(axes, part, axis)
+        _draw_models(axes, part, lines, axis)
+        axes.set_title(title, fontsize=9)
+        axes.set_xlabel(axis.label, fontsize=9)
+    if not logarithmic:
+        grid[0, 0].set_ylim(*_heights(comparison))
+    for i, axes in enumerate(grid.flat):
+        axes.set_visible(i < len(panels))
+        axes.tick_params(labelbottom=i + columns >= len(panels))
+        if i + columns < len(panels):
+            axes.set_xlabel("")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
+    # the models of a contrast are its own; others are the same in a whole row
+    own = bool(comparison.attrs["composite"]) and axis.dim != "contrast" and "contrast" in comparison.dims
+    for i, (axes, (_, part)) in enumerate(zip(grid.flat, panels, strict=False)):
+        if own or i == min(len(panels), (i // columns + 1) * columns) - 1:
+            _label_models(axes, part, lines, axis)
+    _legend(figure, panels[0][1], axis)
+    figure.supxlabel(_notes(comparison), fontsize=7.5, color="#555555")
+    return figure
+
+
+def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
+    """Limits of the conductivity: from 0 for networks, about the simulated values for composites."""
+    if not comparison.attrs["composite"]:
+        return 0.0, None
+    names = ("conductivity_mean", "conductivity_ci_low", "conductivity_ci_high")
+    values = np.concatenate([comparison[name].values.ravel() for name in names])
+    values = values[np.isfinite(values)]
+    if values.size == 0:
+        return 0.0, None
+    low, high = float(values.min()), float(values.max())
+    margin = MARGIN * (high - low if high > low else abs(high) or 1.0)
+    return low - margin, high + margin
+
+
+def _axis(comparison: xarray.Dataset) -> _Axis:
+    """The density, or with one density the angle or contrast. Each contrast has a panel, because its models differ."""
+    methods = "method" if "method" in comparison.dims else None
+    for variant, label in VARIANTS.items():
+        if comparison.sizes["density"] == 1 and comparison.sizes.get(variant, 1) > 1:
+            return _Axis(variant, label, methods)
+    if comparison.attrs["composite"]:
+        return _Axis("density", "volume fraction of the particles [-]", methods)
+    return _Axis(
+        "density",
+        "density (particle area over box area) [-]",
+        "contact_angle" if "contact_angle" in comparison.dims else None,
+    )
+
+
+def _panels(comparison: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
+    """A title and a part of the comparison for each panel; no dimension is left but the axis and the curves."""
+    if axis.dim in VARIANTS:
+        comparison = comparison.isel(density=0)
+    dims = [dim for dim in ("contrast", "method") if dim in comparison.dims and dim not in (axis.dim, axis.curves)]
+    if not dims:
+        return [("", comparison)]
+    (dim,) = dims
+    return [(f"{dim} {_word(value)}", comparison.sel({dim: value})) for value in comparison[dim].values]
+
+
+def _word(value: Any) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def _is_wide(values: NDArray[np.float64]) -> bool:
+    positive = values[np.nan_to_num(values) > 0.0]
+    return bool(positive.size and np.log10(positive.max() / positive.min()) > DECADES)
+
+
+def _curves(part: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
+    if axis.curves is None:
+        return [("simulation", part)]
+    values = part[axis.curves].values
+    return [(v if axis.curves == "method" else f"{v:g}°", part.sel({axis.curves: v})) for v in values]
+
+
+def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
+    looks = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
+    for (_, curve), (colour, marker) in zip(_curves(part, axis), looks, strict=False):
+        x = curve[axis.dim].values
+        low, high = curve["conductivity_ci_low"].values, curve["conductivity_ci_high"].values
+        mean = curve["conductivity_mean"].values
+        if axes.get_yscale() == "log":
+            mean, low = np.where(mean > 0.0, mean, np.nan), np.where(low > 0.0, low, 1e-2 * mean)
+        axes.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0.0)
+        if x.size == 1:
+            axes.errorbar(x, mean, [mean - low, high - mean], fmt="none", ecolor=colour, elinewidth=0.9, capsize=3)
+        axes.plot(x, mean, marker=marker, color=colour, markersize=4.5, linewidth=1.6, zorder=3)
+        if MEAN_FIELD in curve["model"].values:
+            field = curve["model_conductivity"].sel({"model": MEAN_FIELD}).values
+            shade = GREY if axis.curves == "method" else colour  # it is the same for all methods
+            axes.plot(x, field, linestyle=(0, (4, 2)), color=shade, linewidth=0.9, zorder=2)
+
+
+def _drawn(part: xarray.Dataset) -> list[str]:
+    """The models that get a line: formulas with a value other than 0 somewhere."""
+    names = [str(name) for name in part["model"].values if name != MEAN_FIELD]
+    values = part["model_conductivity"]
+    return [n for n in names if bool((values.sel({"model": n}) > 0.0).any())]
+
+
+def _lines(
+    part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis
+) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
+    """Name, abscissas and ordinates of every model line."""
+    source = lines if axis.dim == "density" else part
+    if "contrast" in source.dims and axis.dim != "contrast":
+        source = source.sel(contrast=part["contrast"].item())
+    x, values = source[axis.dim].values, source["model_conductivity"]
+    values = values.isel({dim: 0 for dim in values.dims if dim not in ("model", axis.dim)})  # a formula of the density
+    return [(name, x, np.broadcast_to(values.sel({"model": name}).values, x.shape)) for name in _drawn(part)]
+
+
+def _draw_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
+    bound = {"hashin_shtrikman_lower", "hashin_shtrikman_upper", "series", "parallel"}
+    for name, x, y in _lines(part, lines, axis):
+        axes.plot(x, y, color=INK if name in bound else GREY, linewidth=0.8, linestyle="-" if name in bound else "-.")
+        if x.size == 1:
+            axes.plot(x, y, marker="_", color=GREY, markersize=14)
+
+
+def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
+    """Names at the right ends of the model lines, or where they leave the panel, moved apart."""
+    ends = []
+    bottom, top = axes.get_ylim()
+    for name, x, y in _lines(part, lines, axis):
+        shown = np.flatnonzero((y >= bottom) & (y <= top))
+        if shown.size:
+            ends.append((name, float(x[shown[-1]]), float(y[shown[-1]])))
+    if not ends:
+        return
+    axes.set_xlim(axes.get_xlim())  # the labels are placed in these limits
+    axes.set_ylim(axes.get_ylim())
+    to_fraction = axes.transScale + axes.transLimits
+    points = [to_fraction.transform((x, y)) for _, x, y in ends]
+    heights = spread([float(p[1]) for p in points], 0.05, 0.0, 1.0)
+    for (name, _, _), point, height in zip(ends, points, heights, strict=True):
+        axes.annotate(
+            SHORT.get(name, name.replace("_", " ")),
+            xy=(float(point[0]), float(point[1])),
+            xycoords="axes fraction",
+            xytext=(1.03, height),
+            textcoords="axes fraction",
+            fontsize=7.5,
+            color="#444444",
+            va="center",
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": "#bbbbbb", "linewidth": 0.5, "shrinkA": 1, "shrinkB": 0},
+        )
+
+
+def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
+    looks = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
+    handles: list[Any] = []
+    for (label, _), (colour, marker) in zip(_curves(part, axis), looks, strict=False):
+        handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.6, label=label))
+    if MEAN_FIELD in part["model"].values:
+        handles.append(Line2D([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=0.9, label="contact mean field"))
+    title = "contact half-angle" if axis.curves == "contact_angle" else None
+    columns = min(len(handles), 6)
+    figure.legend(
+        handles=handles,
+        title=title,
+        fontsize=8,
+        title_fontsize=8,
+        frameon=False,
+        loc="outside upper center",
+        ncols=columns,
+    )
+
+
+def _notes(comparison: xarray.Dataset) -> str:
+    level = comparison["half_width"].attrs["confidence_level"]
+    counts = comparison["count"].values[comparison["count"].values > 0]
+    few, many = (int(counts.min()), int(counts.max())) if counts.size else (0, 0)
+    number = f"{many}" if few == many else f"{few} to {many}"
+    diagonal = "$k_{xx}$ and $k_{yy}$" if comparison.attrs["dimension"] == 2 else "$k_{xx}$, $k_{yy}$ and $k_{zz}$"
+    mean = f"the mean of {diagonal}"
+    notes = [f"Bands: {100 * level:g} % Student-t interval of {mean}, {number} realizations."]
+    zero = [
+        SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
+    ]
+    if zero and comparison.attrs["pore_conductivity"] == 0.0:
+        notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
+    if not comparison.attrs["composite"]:
+        notes.append(f"{BOUNDS_NOTE}.")
+    return "\n".join(notes)

@@ -1,0 +1,1 @@
+"""Reads and writes particles; a format is one file and one row of the table."""

@@ -1,0 +1,1 @@
+"""Study files: tables, their words, what they allow, and the identity of a study."""

@@ -1,0 +1,195 @@
+"""Claiming an output: is it free, is there something to resume, and is that of the same study."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from etc_engine.durable.files import write_atomically
+from etc_engine.durable.lock import Lock
+from etc_engine.durable.provenance import Run, engine_commit, engine_version, this_run
+from etc_engine.errors import OutputError, StudyError
+from etc_engine.study.sweep import Study, read_study
+from etc_engine.sweep.shards import (
+    SUFFIX,
+    clear_folder,
+    read_study_file,
+    shard_folder,
+    write_study_file,
+)
+
+Policy = Literal["fresh", "resume", "overwrite"]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An output that is this run's to compute. ``complete`` if a former run has finished it."""
+
+    study: Study
+    text: str
+    output: Path
+    run: str
+    complete: bool = False
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def folder(self) -> Path:
+        """Where the shards are."""
+        return shard_folder(self.output)
+
+
+def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, held: ExitStack) -> Claim:
+    """Check the study, lock the output and prepare its folder of shards.
+
+    Parameters
+    ----------
+    study_path, output : Path
+        The study file and the netCDF file to write.
+    policy : {"fresh", "resume", "overwrite"}
+        What to do where there is an output, or shards of one.
+    ranks : int
+        How many compute, for the record.
+    held : ExitStack
+        Takes the lock; it is released when the stack is closed.
+
+    Raises
+    ------
+    StudyError
+        If the study is not valid, or is another than the one to resume.
+    OutputError
+        If the output exists, is locked or cannot be written.
+    """
+    study, text = read_study(study_path)
+    folder, run = _make_folder(output), new_run()
+    held.callback(_remove_if_empty, folder)
+    lock = held.enter_context(Lock(folder, run))
+    shards = sorted(folder.glob(f"*{SUFFIX}"))
+    if policy == "fresh" and (shards or output.exists()):
+        what = f"finished units of {output}" if shards else f"{output}"
+        raise OutputError(f"{what} exist{'' if shards else 's'}: go on with --resume, or start anew with --overwrite")
+    if policy == "resume" and not shards and output.exists():
+        refuse_other_study(study, *_study_of_output(output), str(output))
+        return Claim(study, text, output, run, complete=True)
+    remarks: tuple[str, ...] = ()
+    if policy == "resume" and shards:
+        found = read_study_file(folder)
+        if found is None:
+            raise StudyError(f"{folder} does not say which study its units belong to: start anew with --overwrite")
+        refuse_other_study(study, *found, str(folder))
+        remarks = _other_engines(folder)
+    else:
+        clear_folder(folder)
+        write_study_file(folder, study.identity(), study.digest())
+    for leftover in output.parent.glob(f".{output.name}.*.tmp"):  # of a run killed while it wrote the output
+        leftover.unlink(missing_ok=True)
+    record = json.dumps(asdict(this_run(run, ranks, lock.holder.job)))
+    write_atomically(folder / f"{run}.run", record.encode())
+    return Claim(study, text, output, run, remarks=remarks)
+
+
+def new_run() -> str:
+    """A name for a run that no other has, in the order of time."""
+    return f"{datetime.now(UTC):%Y%m%dT%H%M%S}-{secrets.token_hex(3)}"
+
+
+def recorded_runs(folder: Path) -> list[Run]:
+    """All runs that worked on an output, the first one first."""
+    return [Run(**json.loads(path.read_text())) for path in sorted(folder.glob("*.run"))]
+
+
+def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str = "") -> str:
+    """The first key in which two studies differ, in words; empty if they do not.
+
+    Examples
+    --------
+    >>> difference({"seed": 7, "packing": {"count": 3}}, {"seed": 7, "packing": {"count": 4}})
+    'packing.count is 3 there and 4 here'
+    """
+    for key in sorted({*found, *wanted}):
+        there, here = found.get(key), wanted.get(key)
+        if isinstance(there, Mapping) and isinstance(here, Mapping):
+            inner = difference(there, here, f"{prefix}{key}.")
+            if inner:
+                return inner
+        elif there != here:
+            return f"{prefix}{key} is {there!r} there and {here!r} here"
+    return ""
+
+
+def _make_folder(output: Path) -> Path:
+    """The folder of the shards, made if it is not there."""
+    if output.is_dir():
+        raise OutputError(f"output {output} is a folder: expected the name of a netCDF file to write")
+    if not output.parent.is_dir():
+        raise OutputError(f"output {output}: there is no folder {output.parent}, make it first")
+    folder = shard_folder(output)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"output {output}: cannot write in {output.parent} ({error.strerror})") from None
+    return folder
+
+
+def _remove_if_empty(folder: Path) -> None:
+    """Neither a refused nor a completed run leaves a folder behind."""
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _study_of_output(output: Path) -> tuple[str, dict[str, Any]]:
+    from etc_engine.sweep.dataset import open_dataset
+
+    attributes = open_dataset(output).attrs
+    return attributes["study_digest"], json.loads(attributes["study_resolved"])
+
+
+class Identified(Protocol):
+    """A study that says what decides its numbers."""
+
+    def identity(self) -> dict[str, Any]:
+        """What decides the numbers, as plain values."""
+
+    def digest(self) -> str:
+        """SHA-256 of the identity."""
+
+
+def refuse_other_study(study: Identified, digest: str, identity: Mapping[str, Any], place: str) -> None:
+    """Refuse a place that holds the numbers of another study than this one.
+
+    Parameters
+    ----------
+    study : Study, or a study of another command
+    digest : str
+    identity : mapping
+        Of the study that ``place`` belongs to.
+    place : str
+        For the message.
+
+    Raises
+    ------
+    StudyError
+        It names the first key that differs.
+    """
+    if digest == study.digest():
+        return
+    wanted = study.identity()
+    found = {key: value for key, value in identity.items() if key in wanted}
+    raise StudyError(
+        f"{place} belongs to another study ({difference(found, wanted)}): "
+        "resume with that study, or start anew with --overwrite"
+    )
+
+
+def _other_engines(folder: Path) -> tuple[str, ...]:
+    """A remark if earlier units come from another version of the engine."""
+    here = f"{engine_version()} ({engine_commit()})"
+    others = {f"{run.engine} ({run.commit})" for run in recorded_runs(folder)} - {here}
+    if not others:
+        return ()
+    return (f"finished units come from etc_engine {', '.join(sorted(others))}, this is {here}",)

@@ -1,0 +1,264 @@
+"""The dataset of a sweep: records in, one xarray dataset out, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.durable.files import sync_folder
+from etc_engine.errors import OutputError
+from etc_engine.realization import Status
+from etc_engine.study.sweep import Study
+from etc_engine.sweep.statistics import summarize
+from etc_engine.sweep.table import CELL_VARIABLES, UNIT_VARIABLES, Table
+
+if TYPE_CHECKING:
+    import xarray
+
+Values = dict[str, NDArray[Any]]
+SWEPT = ("density", "contact_angle", "contrast", "method")
+"""The dimensions of the cells; a result has those its study varies, and always ``density``."""
+
+UNIT = ("density", "realization")
+TENSOR = ("direction_i", "direction_j")
+INCIDENTAL = ("_seconds", "_rank", "_host", "_time")
+"""Endings of the names of variables that differ from run to run."""
+
+
+STATISTICS = {
+    "mean": "mean of the conductivity over realizations",
+    "std": "standard deviation of the conductivity over realizations",
+    "sem": "standard error of the mean conductivity",
+    "ci_low": "lower end of the confidence interval of the mean conductivity",
+    "ci_high": "upper end of the confidence interval of the mean conductivity",
+}
+STREAM_COMMENT = (
+    "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
+    "of the density as a double (NaN: the packer's own); stored is generate_state(1, uint64) of the sequence"
+)
+VARIANTS = {
+    "contact_angle": {
+        "long_name": "contact half-angle",
+        "units": "degree",
+        "comment": "half of the angle that the contact arc subtends at the centre of a disk; not a wetting angle",
+    },
+    "contrast": {
+        "long_name": "contrast",
+        "units": "1",
+        "comment": "conductivity of the particles over that of the matrix",
+    },
+}
+"""Attributes of the second axis of a sweep."""
+
+
+def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """The dataset of a study from the table of its units.
+
+    Parameters
+    ----------
+    study : Study
+        The study; it gives the dimensions.
+    table : Table
+        What was run; cells without a row are ``not_run``.
+    attributes : mapping
+        Global attributes, see :mod:`etc_engine.sweep.attributes`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``density``, ``contact_angle`` or ``contrast`` (only where the study gives some), ``method`` (only
+        where it lists methods), ``realization``, ``direction_i``, ``direction_j``.
+    """
+    import xarray
+
+    cells, units = _cell_values(study, table), _unit_values(study, table)
+    variant, values = study.variants
+    swept = ("density", variant, "method")
+    cell = (*swept, "realization")
+    dataset = xarray.Dataset(attrs=dict(attributes))
+    dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
+    dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
+    if "exact" in study.conduction.methods:
+        meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
+        dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
+        dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
+    for name, variable in CELL_VARIABLES.items():
+        dataset[name] = (cell, cells[name], variable.attributes)
+    dataset["status"] = (cell, cells["status"], _status_attributes())
+    dataset["message"] = (cell, cells["message"], {"long_name": "what went wrong, in words"})
+    for name, variable in UNIT_VARIABLES.items():
+        dataset[name] = (UNIT, units[name], variable.attributes)
+    dataset["random_stream"].attrs["comment"] = STREAM_COMMENT
+    _add_statistics(dataset, swept, cells, study.statistics.confidence)
+    if values is None:
+        dataset = dataset.isel({variant: 0}, drop=True)
+    if isinstance(study.conduction.method, str):
+        dataset = dataset.isel(method=0, drop=True)
+    return dataset
+
+
+def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str, Any]:
+    axes = list("xyz"[: study.box.dimension])
+    density, comment = study.packing.density, "sum of the full particle areas over the area of the box"
+    if density is None:
+        reached = packing_density[np.isfinite(packing_density)]
+        density = (float(reached.mean()) if reached.size else np.nan,)
+        comment += "; the packer's own, mean over realizations"
+    variant, values = study.variants
+    return {
+        "density": ("density", np.array(density), {"long_name": "density", "units": "1", "comment": comment}),
+        variant: (variant, np.array(values or (np.nan,)), VARIANTS[variant]),
+        "method": ("method", np.array(study.conduction.methods, dtype=object), {"long_name": "method"}),
+        "realization": (
+            "realization",
+            np.arange(study.statistics.cap),
+            {"long_name": "realization", "units": "1"},
+        ),
+        "direction_i": ("direction_i", np.array(axes, dtype=object), {"long_name": "direction of the flux"}),
+        "direction_j": (
+            "direction_j",
+            np.array(axes, dtype=object),
+            {"long_name": "direction of the gradient"},
+        ),
+    }
+
+
+def _cell_values(study: Study, table: Table) -> Values:
+    """Arrays over (density, contact angle or contrast, method, realization)."""
+    rows, d = table.rows, study.box.dimension
+    variants, methods = rows.dtype["status"].shape
+    shape = (len(study.densities), variants, methods, study.statistics.cap)
+    values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in CELL_VARIABLES.items()}
+    values["conductivity"] = np.full((*shape, d, d), np.nan)
+    values["conductivity_bounds"] = np.full((*shape, d, 2), np.nan)
+    values["status"] = np.full(shape, Status.NOT_RUN, np.int8)
+    for name, grid in values.items():
+        grid[rows["density_index"], :, :, rows["realization"]] = rows[name]
+    values["message"] = np.full(shape, "", object)
+    for (i, r, a, m), text in table.messages.items():
+        values["message"][i, a, m, r] = text
+    return values
+
+
+def _unit_values(study: Study, table: Table) -> Values:
+    """Arrays over (density, realization)."""
+    rows, shape = table.rows, (len(study.densities), study.statistics.cap)
+    values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in UNIT_VARIABLES.items()}
+    for name, grid in values.items():
+        grid[rows["density_index"], rows["realization"]] = rows[name]
+    return values
+
+
+def _add_statistics(dataset: xarray.Dataset, swept: tuple[str, ...], cells: Values, confidence: float) -> None:
+    """Statistics over the realizations that have a conductivity, 0 of a non-percolating one included."""
+    valid = cells["status"] <= Status.NOT_PERCOLATING
+    shape, tensor = valid.shape[:-1], cells["conductivity"].shape[-2:]
+    count = np.zeros(shape, np.int64)
+    values = {name: np.full(shape + tensor, np.nan) for name in STATISTICS}
+    for place in np.ndindex(*shape):
+        summary = summarize(cells["conductivity"][place][valid[place]], confidence)
+        count[place] = summary.count
+        for name in STATISTICS:
+            values[name][place] = getattr(summary, name)
+    for name, long_name in STATISTICS.items():
+        attributes = _conductivity_attributes(long_name)
+        if name.startswith("ci"):
+            attributes |= {
+                "confidence_level": confidence,
+                "comment": "Student t with count - 1 degrees of freedom",
+            }
+        dataset[f"conductivity_{name}"] = (swept + TENSOR, values[name], attributes)
+    dataset["count"] = (
+        swept,
+        count,
+        {"long_name": "realizations that enter the statistics: ok and not_percolating", "units": "1"},
+    )
+
+
+def _conductivity_attributes(long_name: str) -> dict[str, Any]:
+    return {
+        "long_name": long_name.replace("conductivity", "effective thermal conductivity"),
+        "units": "W m-1 K-1",
+    }
+
+
+def _status_attributes() -> dict[str, Any]:
+    return {
+        "long_name": "how the realization ended",
+        "flag_values": np.array([int(status) for status in Status], dtype=np.int8),
+        "flag_meanings": " ".join(status.name.lower() for status in Status),
+    }
+
+
+def write_dataset(dataset: xarray.Dataset, output: Path) -> None:
+    """Write a dataset as netCDF-4: temporary file, sync, rename.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written; nothing is left behind then.
+    """
+    temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
+    try:
+        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
+        with temporary.open("rb") as stream:
+            os.fsync(stream.fileno())
+        temporary.replace(output)
+        sync_folder(output.parent)
+    except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as RuntimeError
+        temporary.unlink(missing_ok=True)
+        raise OutputError(f"cannot write {output}: {error}; the finished units are safe in its shards") from None
+
+
+def differing_variables(one: xarray.Dataset, other: xarray.Dataset) -> list[str]:
+    """Names of the variables in which two datasets do not have the same bits.
+
+    Variables that say where and when something was computed (``_seconds``, ``_rank``, ``_host``, ``_time``)
+    and attributes are left out.
+    """
+    names = sorted({str(name) for name in (*one.variables, *other.variables)})
+    return [name for name in names if not name.endswith(INCIDENTAL) and not same_bits(one, other, name)]
+
+
+def same_bits(one: xarray.Dataset, other: xarray.Dataset, name: str) -> bool:
+    """Whether a variable has the same bits in two datasets."""
+    if name not in one.variables or name not in other.variables:
+        return False
+    a, b = one[name].values, other[name].values
+    if a.shape != b.shape:
+        return False
+    if a.dtype.kind not in "biuf":  # words, in whatever way they are held
+        return bool(a.ravel().tolist() == b.ravel().tolist())
+    return bool(a.dtype == b.dtype and a.tobytes() == b.tobytes())
+
+
+def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
+    """NaN is what a missing number is; integers have none, and no attribute should say so."""
+    return {str(name): {"_FillValue": None} for name, values in dataset.variables.items() if values.dtype.kind != "O"}
+
+
+def open_dataset(path: Path) -> xarray.Dataset:
+    """The dataset in a file, loaded and closed.
+
+    Raises
+    ------
+    OutputError
+        If the file is missing or is not the result of a sweep.
+    """
+    import xarray
+
+    try:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
+            dataset = stored.load()
+    except OSError as error:
+        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
+    except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
+        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
+    if "study_digest" not in dataset.attrs:
+        raise OutputError(f"{path} is not the result of a sweep: it has no attribute study_digest")
+    return dataset

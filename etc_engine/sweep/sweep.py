@@ -1,0 +1,272 @@
+"""A sweep from end to end: claim the output, run the units in rounds, write the dataset.
+
+Rank 0 decides (what to run, whether to go on) and every rank computes. Decisions see the shards alone,
+so that a sweep in one go and a sweep in pieces take the same ones.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.durable.stop import Stopped, StopRequest
+from etc_engine.durable.watch import Watch
+from etc_engine.errors import OutputError
+from etc_engine.realization import Realization, RealizationSpec, Status
+from etc_engine.study.sweep import Study
+from etc_engine.sweep.attributes import global_attributes
+from etc_engine.sweep.claim import Claim, Policy, claim_output, recorded_runs
+from etc_engine.sweep.dataset import assemble, open_dataset, write_dataset
+from etc_engine.sweep.gathering import Gatherer
+from etc_engine.sweep.plan import Unit, next_targets, unit_rng, units_to_run
+from etc_engine.sweep.records import Record, failed_realization
+from etc_engine.sweep.scheduler import STOP, Communicator, on_rank_zero
+from etc_engine.sweep.shards import ShardWriter, clear_folder, shard_path
+from etc_engine.sweep.table import Table
+
+if TYPE_CHECKING:
+    import xarray
+
+Realize = Callable[[RealizationSpec, np.random.Generator], Realization]
+Report = Callable[[int, int, int], None]
+"""Called on rank 0 with units done, units planned and cells failed."""
+
+Notify = Callable[[str], None]
+"""Called on rank 0 with a remark."""
+
+NEXT, DONE, FAILED = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a sweep ended. ``cells`` counts the statuses; ``stopped`` is the reason of an early end."""
+
+    output: Path
+    units: int
+    computed: int
+    cells: Mapping[Status, int] = field(default_factory=dict)
+    stopped: str = ""
+
+    @property
+    def failed(self) -> int:
+        """Cells that should have a conductivity and have none."""
+        return sum(n for status, n in self.cells.items() if Status.NOT_PERCOLATING < status < Status.NOT_RUN)
+
+
+def _silent(*_: object) -> None:
+    """Tell nobody."""
+
+
+def sweep(
+    study_path: Path,
+    output: Path,
+    policy: Policy,
+    communicator: Communicator,
+    realize: Realize,
+    *,
+    report: Report = _silent,
+    notify: Notify = _silent,
+) -> Outcome:
+    """Run a study on all ranks of a communicator and write its dataset.
+
+    Parameters
+    ----------
+    study_path, output : Path
+        The study file and the netCDF file to write.
+    policy : {"fresh", "resume", "overwrite"}
+        What to do where there is an output, or shards of one.
+    communicator : Communicator
+        See :func:`etc_engine.sweep.scheduler.connect`; every rank calls this function.
+    realize : callable
+        (spec, rng) -> Realization, :func:`etc_engine.realization.realize` or a stand-in.
+    report, notify : callable
+        Progress and remarks, called on rank 0 only.
+
+    Returns
+    -------
+    Outcome
+        The same on every rank.
+
+    Raises
+    ------
+    StudyError
+        If the study is not valid, or is another than the one to resume.
+    OutputError
+        If the output exists, is locked or cannot be written. Every rank raises the same error.
+    """
+    with StopRequest() as stop, ExitStack() as held:
+        claim = on_rank_zero(communicator, partial(claim_output, study_path, output, policy, communicator.size, held))
+        if claim.complete:
+            return on_rank_zero(communicator, partial(_outcome_of_file, claim))
+        with Watch(claim.folder / "lock", claim.run, launched=communicator.size > 1):
+            table, computed, stopped = _run_rounds(claim, communicator, realize, stop, report, notify)
+        communicator.wait_for_all(_silent)  # nobody watches the lock any more, rank 0 may give it back
+        if stopped:
+            return Outcome(output, 0, computed, stopped=stopped)
+        return on_rank_zero(communicator, partial(_finish, claim, table, computed))
+
+
+def _run_rounds(
+    claim: Claim, communicator: Communicator, realize: Realize, stop: StopRequest, report: Report, notify: Notify
+) -> tuple[Table, int, str]:
+    """Compute round after round until every cell is settled.
+
+    Answers the table (on rank 0), how many units all ranks have computed, and why they stopped if they did.
+    """
+    gatherer, computed = Gatherer(claim.study, claim.folder, communicator), 0
+    targets = (claim.study.statistics.realizations,) * len(claim.study.densities)
+    table = gatherer.gather()
+    for number in count():
+        plan = on_rank_zero(communicator, partial(_plan_round, claim, table, targets, computed))
+        if number == 0 and communicator.rank == 0:
+            _notify_start(claim, plan, gatherer.damaged, notify)
+        if not plan.units.size:
+            break
+        base = computed + number * communicator.size
+        round_ = _Round(claim, plan, base, f"{claim.run}-{number}", report)
+        stopped = _run_round(round_, communicator, realize, stop)
+        if stopped:
+            return table, communicator.add(DONE, 0), stopped
+        written = shard_path(claim.folder, round_.shard, communicator.rank)
+        try:
+            table = gatherer.gather_all(plan.units, written if written.exists() else None)
+        except OutputError as error:
+            return table, communicator.add(DONE, 0), str(error)
+        targets, computed = plan.targets, computed + len(plan.units)
+    return table, computed, ""
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What a round computes, and where it stands in the whole: ``known`` units were there before this run."""
+
+    targets: tuple[int, ...]
+    units: NDArray[np.int64]
+    known: int
+    planned: int
+
+
+@dataclass(frozen=True)
+class _Round:
+    """Units between two decisions; ``base`` is where the shared counter stood when they began."""
+
+    claim: Claim
+    plan: _Plan
+    base: int
+    shard: str
+    report: Report
+
+    def tell(self, communicator: Communicator) -> None:
+        """Report the progress, from rank 0."""
+        if communicator.rank == 0:
+            done = self.plan.known + communicator.add(DONE, 0)
+            self.report(done, self.plan.planned, communicator.add(FAILED, 0))
+
+
+def _plan_round(claim: Claim, table: Table, targets: tuple[int, ...], computed: int) -> _Plan:
+    """The next round that has something to compute, or an empty one when every cell is settled.
+
+    Rounds that the shards hold already are decided again from the same units, as if they ran now.
+    """
+    study = claim.study
+    units = units_to_run(study.densities, targets, table.units)
+    while not units.size:
+        grown = next_targets(study, targets, table)
+        if grown == targets:
+            break
+        targets = grown
+        units = units_to_run(study.densities, targets, table.units)
+    planned = sum(targets)
+    return _Plan(targets, units, planned - len(units) - computed, planned)
+
+
+def _run_round(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
+    """Compute the units of a round on all ranks; answers the reason if any of them stopped early."""
+    reason = _compute(round_, communicator, realize, stop)
+    communicator.wait_for_all(lambda: round_.tell(communicator))
+    reasons = communicator.gather(reason)
+    return str(communicator.broadcast(next(filter(None, reasons), "") if reasons else ""))
+
+
+def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
+    """Take units until there are none; answers why this rank stopped early, or nothing.
+
+    Every rank takes one number beyond the last unit: the next round's base allows for it.
+    """
+    claim, units = round_.claim, round_.plan.units
+    densities = claim.study.densities
+    specs = [claim.study.realization_spec(density) for density in densities]
+    try:
+        with ShardWriter(claim.folder, round_.shard, communicator.rank) as shard:
+            while (index := communicator.add(NEXT, 1) - round_.base) < len(units):
+                i, realization = units[index].tolist()
+                unit = Unit(densities[i], realization)
+                record = stop.run(partial(run_unit, claim.study, specs[i], unit, communicator.rank, realize))
+                shard.append(record)
+                communicator.add(DONE, 1)
+                if record.failed:
+                    communicator.add(FAILED, record.failed)
+                round_.tell(communicator)
+    except Stopped:
+        communicator.add(NEXT, STOP)
+    except OutputError as error:
+        communicator.add(NEXT, STOP)
+        return str(error)
+    return stop.reason
+
+
+def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize: Realize) -> Record:
+    """One realization; what it raises becomes its result."""
+    started = time.time()
+    try:
+        result = realize(spec, unit_rng(study.seed, unit))
+    except Exception as error:
+        result = failed_realization(error, spec, study.box.dimension)
+    return Record(unit, result, rank, socket.gethostname(), started, time.time())
+
+
+def _finish(claim: Claim, table: Table, computed: int) -> Outcome:
+    """Assemble the dataset, put it in place, take the shards away."""
+    hosts = np.unique(table.rows["worker_host"]).tolist()
+    attributes = global_attributes(claim.study, claim.text, recorded_runs(claim.folder), hosts)
+    dataset = assemble(claim.study, table, attributes)
+    outcome = Outcome(claim.output, len(table.rows), computed, _count_cells(dataset))
+    try:
+        write_dataset(dataset, claim.output)
+    except OutputError as error:
+        return replace(outcome, stopped=str(error))
+    clear_folder(claim.folder)
+    return outcome
+
+
+def _outcome_of_file(claim: Claim) -> Outcome:
+    """The outcome of a sweep that had finished before."""
+    dataset = open_dataset(claim.output)
+    units = int((dataset["worker_rank"] >= 0).sum())
+    return Outcome(claim.output, units, 0, _count_cells(dataset))
+
+
+def _count_cells(dataset: xarray.Dataset) -> dict[Status, int]:
+    found = Counter(dataset["status"].values.ravel().tolist())
+    return {status: found[int(status)] for status in Status if found[int(status)]}
+
+
+def _notify_start(claim: Claim, plan: _Plan, damaged: int, notify: Notify) -> None:
+    """Say what was found before the first round."""
+    for remark in claim.remarks:
+        notify(remark)
+    if damaged:
+        notify(f"{damaged} damaged lines in the shards are left out, their units run again")
+    if plan.known:
+        notify(f"{plan.known} of {plan.planned} units are finished already")
