@@ -132,9 +132,7 @@ def laguerre_cells(centers: Floats, radii: Floats, box: Box) -> LaguerreCells:
     spacing = float(np.sqrt(box.volume / radii.size))
     bins = np.maximum(np.floor(lengths / (1.2 * spacing)), 1.0).astype(np.int64)
     order, first = _sort_into_bins(centers, lengths, bins)
-    starts, who, corners, failed = _clip_cells(
-        (centers, radii**2, lengths, periodic), (order, first, bins)
-    )
+    starts, who, corners, failed = _clip_cells((centers, radii**2, lengths, periodic), (order, first, bins))
     if failed >= 0:
         _refuse_lost(int(failed), centers, radii, box)
     near = SAME_VERTEX * spacing
@@ -146,7 +144,7 @@ def laguerre_cells(centers: Floats, radii: Floats, box: Box) -> LaguerreCells:
     if thin.any():
         _refuse_lost(int(np.flatnonzero(thin)[0]), centers, radii, box)
     who, vertices, corners = who[keep], vertices[keep], corners[keep]
-    used, vertices = np.unique(vertices, return_inverse=True)
+    vertices, vertex_count = _renumber(vertices)
     edges, forward, seen, unmatched = _match_sides(starts, who)
     if unmatched >= 0:
         i = int(np.searchsorted(starts, unmatched, side="right")) - 1
@@ -165,9 +163,9 @@ def laguerre_cells(centers: Floats, radii: Floats, box: Box) -> LaguerreCells:
         starts,
         edges,
         forward,
-        vertices.astype(np.int64),
+        vertices,
         corners,
-        int(used.size),
+        vertex_count,
         cells,
         who[seen, 1:],
         normals,
@@ -201,8 +199,8 @@ def _refuse_outside(cells: Ints, distances: Floats, centers: Floats, radii: Floa
                 f"the centre of particle {max(i, j)} lies on a wall ({centers[max(i, j)]}): move it into the box"
             )
         raise GeometryError(
-            f"the centre of particle {i} (radius {radii[i]:.6g}) lies outside its own Laguerre cell, beyond the radical "
-            f"line with particle {j} (radius {radii[j]:.6g}): they overlap too far; remove one of them"
+            f"the centre of particle {i} (radius {radii[i]:.6g}) lies outside its own Laguerre cell, beyond the "
+            f"radical line with particle {j} (radius {radii[j]:.6g}): they overlap too far; remove one of them"
         )
 
 
@@ -240,6 +238,13 @@ def _merge_vertices(points: Floats, corners: Floats, box: Box, near: float) -> t
     order, first = _sort_into_bins(wrapped, lengths, bins)
     roots = _cluster(wrapped, lengths, np.asarray(box.periodic), order, first, bins, near)
     return roots, corners + box.minimum_image(wrapped[roots] - wrapped)
+
+
+def _renumber(vertices: Ints) -> tuple[Ints, int]:
+    """The same numbers without holes, in order, and how many there are."""
+    present = np.zeros(int(vertices.max()) + 1, dtype=np.bool_)
+    present[vertices] = True
+    return (np.cumsum(present) - 1)[vertices], int(present.sum())
 
 
 @njit(cache=True)

@@ -29,7 +29,7 @@ FLUID_THAT_COUNTS = 1e-4
 @njit(cache=True)
 def own_coordinate(sigma, start, stop, corner, own):  # type: ignore[no-untyped-def]
     """Coordinate of one side for the common coordinate: piecewise linear, ends kept, corner to own corner."""
-    if corner == own or corner == 0.0:
+    if corner in (own, 0.0):
         return sigma
     if sigma < -corner:
         return start + (sigma - start) * (-own - start) / (-corner - start)
@@ -174,8 +174,6 @@ def reduce_cell(i, cells, edges, grid, lobatto, materials, work):  # type: ignor
     [inner:size, inner:size] is K (upper triangle), and T^-1 times the coupling of the bumps m to the dense unknowns.
     """
     rim, numbers, matrix, coupling, solved, first, second, local = work
-    angles, sides, edge_of, _, _, _, weights = rim
-    of_rim, of_jump, bump = numbers
     count = place_rim(i, cells, edges, grid, lobatto, rim)
     inner = number_unknowns(count, edges, rim, numbers)
     polygon = cells[0][i + 1] - cells[0][i]
@@ -188,61 +186,28 @@ def reduce_cell(i, cells, edges, grid, lobatto, materials, work):  # type: ignor
             columns[side, 2 + k] = inner + polygon + side * (degree - 1) + k
     matrix[:size, :size] = 0.0
     coupling[:count, :size] = 0.0
-    _add_disk(count, angles, sides, weights, columns, of_rim, materials[1][i], degree, matrix, first, second)
+    _add_disk(count, rim, columns, numbers[0], materials[1][i], degree, matrix, first, second)
     diagonal, beside = np.zeros(count), np.zeros(count)
-    dense = np.empty(FIELDS, dtype=np.int64)
+    places = (
+        np.zeros((FIELDS, MOST_DEGREES + 1), np.int64),
+        np.zeros((FIELDS, MOST_DEGREES + 1)),
+        np.zeros(FIELDS, np.int64),
+    )
     for c in range(count):
         d = c + 1 if c + 1 < count else 0
         fields = _interval(c, d, i, edges, rim, materials, local)
-        dense[0], dense[1], dense[2], dense[3] = of_rim[c], -1, of_rim[d], -1
-        dense[4] = dense[5] = -1
-        dense[6], dense[7] = of_jump[c], of_jump[d]
+        _spread(c, d, rim, numbers, columns, degree, places)
         diagonal[c] += local[1, 1]
         diagonal[d] += local[3, 3]
         beside[c] += local[1, 3]
-        for a in range(fields):
-            if a in (4, 5):
-                continue
-            node_a = c if a in (0, 1, 6) else d
-            bumps = a in (1, 3)
-            if bumps:
-                if not bump[node_a]:
-                    continue
-            elif dense[a] < 0:
-                continue
-            for b in range(fields):
-                if b in (1, 3):
-                    continue
-                value = local[a, b]
-                if b not in (4, 5):
-                    if dense[b] < 0:
-                        continue
-                    if bumps:
-                        coupling[node_a, dense[b]] += value
-                    elif dense[a] <= dense[b]:
-                        matrix[dense[a], dense[b]] += value
-                    continue
-                node_b = c if b == 4 else d
-                for k in range(degree + 1):
-                    weight = weights[node_b, k]
-                    if weight != 0.0:
-                        column = columns[sides[node_b], k]
-                        if bumps:
-                            coupling[node_a, column] += value * weight
-                        else:
-                            matrix[dense[a], column] += value * weight
-        _add_edge(c, d, local, sides, weights, columns, degree, matrix)
+        _scatter(c, d, fields, local, places, matrix, coupling)
     for c in range(count):
-        if not bump[c]:
-            diagonal[c] = 1.0
-            beside[c] = 0.0
-            beside[c - 1 if c > 0 else count - 1] = 0.0
+        if not numbers[2][c]:  # m is held at zero
+            diagonal[c], beside[c], beside[c - 1 if c > 0 else count - 1] = 1.0, 0.0, 0.0
             coupling[c, :size] = 0.0
-        if of_rim[c] != c and of_jump[c] != c:
+        if numbers[0][c] != c and numbers[1][c] != c:  # a dense unknown that is not used
             matrix[c, c] = 1.0
-    for c in range(count):
-        for q in range(size):
-            solved[c, q] = coupling[c, q]
+    solved[:count, :size] = coupling[:count, :size]
     solve_cyclic(diagonal, beside, count, size, solved)
     for c in range(count):
         for a in range(size):
@@ -255,9 +220,43 @@ def reduce_cell(i, cells, edges, grid, lobatto, materials, work):  # type: ignor
 
 
 @njit(cache=True)
-def _add_disk(count, angles, sides, weights, columns, of_rim, solid, degree, matrix, first, second):  # type: ignore[no-untyped-def]
+def _spread(c, d, rim, numbers, columns, degree, places):  # type: ignore[no-untyped-def]
+    """Dense columns and weights of the coefficients of the interval from node c to d; bumps have none."""
+    sides, weights = rim[1], rim[6]
+    where, share, many = places
+    for end in range(2):
+        node = c if end == 0 else d
+        for field, number in ((2 * end, numbers[0][node]), (6 + end, numbers[1][node])):
+            where[field, 0], share[field, 0], many[field] = number, 1.0, 1 if number >= 0 else 0
+        field, found = 4 + end, 0
+        for k in range(degree + 1):
+            if weights[node, k] != 0.0:
+                where[field, found], share[field, found] = columns[sides[node], k], weights[node, k]
+                found += 1
+        many[field] = found
+
+
+@njit(cache=True)
+def _scatter(c, d, fields, local, places, matrix, coupling):  # type: ignore[no-untyped-def]
+    """Add a strip matrix to the upper triangle of the dense matrix and to the coupling of the bumps."""
+    where, share, many = places
+    for b in range(fields):
+        for q in range(many[b]):
+            column, weight = where[b, q], share[b, q]
+            coupling[c, column] += local[1, b] * weight
+            coupling[d, column] += local[3, b] * weight
+            for a in range(fields):
+                value = local[a, b] * weight
+                for p in range(many[a]):
+                    if where[a, p] <= column:
+                        matrix[where[a, p], column] += share[a, p] * value
+
+
+@njit(cache=True)
+def _add_disk(count, rim, columns, of_rim, solid, degree, matrix, first, second):  # type: ignore[no-untyped-def]
     """Add the energy of the disk, a form of T_rim = Phi F + W, to the upper triangle of the dense matrix."""
-    disk_energy(angles, count, solid, first, second)
+    sides, weights = rim[1], rim[6]
+    disk_energy(rim[0], count, solid, first, second)
     begin = columns[0, 0]
     size = begin + columns.shape[0] * degree
     product = first  # P = A Phi
@@ -284,25 +283,6 @@ def _add_disk(count, angles, sides, weights, columns, of_rim, solid, degree, mat
                 row = columns[sides[i], k]
                 for q in range(row, size):
                     matrix[row, q] += weight * product[i, q - begin]
-
-
-@njit(cache=True)
-def _add_edge(c, d, local, sides, weights, columns, degree, matrix):  # type: ignore[no-untyped-def]
-    """Add the energy of one interval on the edge temperatures at its two ends to the frame's upper triangle."""
-    for a in range(2):
-        node_a = c if a == 0 else d
-        for b in range(2):
-            node_b = c if b == 0 else d
-            value = local[4 + a, 4 + b]
-            for k in range(degree + 1):
-                left = value * weights[node_a, k]
-                if left == 0.0:
-                    continue
-                row = columns[sides[node_a], k]
-                for m in range(degree + 1):
-                    column = columns[sides[node_b], m]
-                    if column >= row:
-                        matrix[row, column] += left * weights[node_b, m]
 
 
 def workspace(nodes: int, sides: int, degree: int) -> tuple:

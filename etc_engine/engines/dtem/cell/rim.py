@@ -15,13 +15,11 @@ import math
 
 import numpy as np
 from numba import njit
-from scipy.special import zeta
+
+from etc_engine.laws.disk import CLAUSEN_SERIES
 
 _TERMS = 18
-# C(x) - zeta(3) = x^2/2 ln x - 3 x^2/4 + x^4 sum_k c_k x^(2k), from ln(sin z / z) = -sum zeta(2k) (z/pi)^(2k) / k
-_REMAINDER = np.array(
-    [-zeta(2 * k) / (k * (2 * k + 1) * (2 * k + 2)) / (2.0 * np.pi) ** (2 * k) for k in range(1, _TERMS + 1)]
-)
+"""Terms of the series of C that reach round-off on 0 .. pi."""
 
 
 @njit(cache=True)
@@ -39,7 +37,7 @@ def disk_energy(angles, count, conductivity, spare, out):  # type: ignore[no-unt
             logs[j] = 0.25 * math.log(x * x) - 0.75
             spare[i, j] = 0.0
         for k in range(_TERMS - 1, -1, -1):
-            term = _REMAINDER[k]
+            term = CLAUSEN_SERIES[k]
             for j in range(i):
                 spare[i, j] = spare[i, j] * squares[j] + term
         for j in range(i):

@@ -21,8 +21,10 @@ import math
 import numpy as np
 from numba import njit
 
-_ALONG, _ALONG_WEIGHTS = (lambda g: (0.5 * (g[0] + 1.0), 0.5 * g[1]))(np.polynomial.legendre.leggauss(4))
-_ACROSS, _ACROSS_WEIGHTS = (lambda g: (0.5 * (g[0] + 1.0), 0.5 * g[1]))(np.polynomial.legendre.leggauss(3))
+_GAUSS_4 = np.polynomial.legendre.leggauss(4)
+_GAUSS_3 = np.polynomial.legendre.leggauss(3)
+_ALONG, _ALONG_WEIGHTS = 0.5 * (_GAUSS_4[0] + 1.0), 0.5 * _GAUSS_4[1]
+_ACROSS, _ACROSS_WEIGHTS = 0.5 * (_GAUSS_3[0] + 1.0), 0.5 * _GAUSS_3[1]
 
 FIELDS = 8
 """Coefficients of an interval: W0, m0, W1, m1, edge0, edge1, and v0, v1 where a contact resists."""
