@@ -104,7 +104,5 @@ def divide(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Reso
     pairs = geometry.cells.cells
     other = np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
     ratio = fluid / np.maximum(solid[pairs[:, 0]], solid[other])
-    grid = grid_edges(
-        geometry.edges, ratio, resolution.degree, corner=resolution.corner, longest=resolution.longest
-    )
+    grid = grid_edges(geometry.edges, ratio, resolution.degree, corner=resolution.corner, longest=resolution.longest)
     return grid, build_frame(geometry.cells, resolution.degree)

@@ -1,13 +1,13 @@
 r"""How the edges of Laguerre cells are divided, and with them the rims of the disks.
 
 Inside a cell the temperature is sharp where two disks come close. The intervals of an edge shrink towards these places.
-With s along the edge, measured from the line of centres, an interval is at most as long as
+With x the distance along the edge from such a place, an interval is about as long as
 
-.. math:: \min\bigl(0.3\,R_{min},\ (s_2 - s_1)/p,\ \mathrm{graded}(s)\bigr)
+.. math:: \min\bigl(0.2\,R_{min},\ (s_2 - s_1)/p,\ \mathrm{graded}(x)\bigr)
 
-for an edge of polynomial degree p, where graded(s) is hypot(s, w) with w = sqrt(gap R_eff) at a gap, and the distance
-to the nearest corner (but at least a smallest size) at a contact: s = 0 of touching disks, both ends of a contact of
-finite width.
+for an edge of polynomial degree p. graded(x) is 0.7 hypot(x, w), w = sqrt(gap R_eff), about the line of centres across
+a gap, and 0.7 x (but at least a smallest size) about a touching point and both ends of a contact. The break points cut
+the integral of 1/size into equal parts, so that they move smoothly with gaps, angles and conductivities.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LONGEST = 0.3
+LONGEST = 0.2
 """Longest interval in radii of the smaller disk."""
+CORNER_GROWTH, GAP_GROWTH = 0.7, 0.7
+"""Growth of the intervals with the distance from a contact, and from the line of centres across a gap."""
 CORNER = 0.05
 """Smallest interval at the ends of a contact, in half-widths of the contact."""
 FINEST = 1e-5
@@ -49,41 +51,79 @@ class EdgeGrid(NamedTuple):
 
 
 @njit(cache=True)
-def _longest(a, b, singular, smallest, count, width):  # type: ignore[no-untyped-def]
-    """Longest interval allowed on [a, b] by the corners and, if width > 0, by a gap about s = 0."""
-    longest = np.inf
-    for k in range(count):
-        longest = min(longest, max(a - singular[k], singular[k] - b, 0.0, smallest[k]))
-    if width > 0.0:
-        longest = min(longest, math.hypot(max(a, -b, 0.0), width))
-    return longest
+def _count_to(x, law, scale, rate, cap):  # type: ignore[no-untyped-def]
+    """Intervals between a place and a distance x from it: the integral of 1/size.
+
+    size(x) = min(cap, max(scale, rate x)) at a corner (law 0), min(cap, rate hypot(x, scale)) at a gap (law 1).
+    """
+    if law == 0:
+        first = min(scale, cap)
+        flat = first / rate
+        if x <= flat or first == cap:
+            return x / first
+        curved = min(x, cap / rate)
+        return 1.0 / rate + math.log(curved / flat) / rate + (x - curved) / cap
+    if rate * scale >= cap:
+        return x / cap
+    curved = min(x, math.sqrt((cap / rate) ** 2 - scale * scale))
+    return math.asinh(curved / scale) / rate + (x - curved) / cap
 
 
 @njit(cache=True)
-def divide_edge(start, stop, cap, singular, smallest, count, width, points):  # type: ignore[no-untyped-def]
-    """Break points of one edge by recursive bisection; returns how many (into ``points``)."""
-    forced = np.empty(count + 2)
-    forced[0], pieces = start, 1
-    tiny = 1e-9 * (stop - start)
-    for k in range(count):
-        if start + tiny < singular[k] < stop - tiny:
-            forced[pieces] = singular[k]
-            pieces += 1
-    forced[pieces] = stop
-    forced = np.sort(forced[: pieces + 1])
-    stack = np.empty(128)
+def _distance_of(n, law, scale, rate, cap):  # type: ignore[no-untyped-def]
+    """Inverse of `_count_to`: the distance that n intervals reach."""
+    if law == 0:
+        first = min(scale, cap)
+        if n <= 1.0 / rate or first == cap:
+            return n * first
+        last = cap / rate
+        most = 1.0 / rate + math.log(last * rate / first) / rate
+        if n > most:
+            return last + (n - most) * cap
+        return first / rate * math.exp(n * rate - 1.0)
+    if rate * scale >= cap:
+        return n * cap
+    last = math.sqrt((cap / rate) ** 2 - scale * scale)
+    most = math.asinh(last / scale) / rate
+    return scale * math.sinh(n * rate) if n <= most else last + (n - most) * cap
+
+
+@njit(cache=True)
+def _divide_piece(start, stop, origin, law, scale, cap, points, found):  # type: ignore[no-untyped-def]
+    """Add the break points of a piece on one side of the place ``origin``; returns how many there are now."""
+    rate = CORNER_GROWTH if law == 0 else GAP_GROWTH
+    sign = 1.0 if start >= origin else -1.0
+    low = _count_to(abs(start - origin), law, scale, rate, cap)
+    high = _count_to(abs(stop - origin), law, scale, rate, cap)
+    pieces = max(math.ceil(abs(high - low) * (1.0 - 1e-9)), 1)
+    for k in range(1, pieces):
+        n = low + (high - low) * k / pieces
+        points[found] = origin + sign * _distance_of(n, law, scale, rate, cap)
+        found += 1
+    points[found] = stop
+    return found + 1
+
+
+@njit(cache=True)
+def divide_edge(start, stop, cap, places, scales, count, law, points):  # type: ignore[no-untyped-def]
+    """Break points of one edge, graded about ascending ``places``; returns how many (into ``points``).
+
+    Each part of the edge is graded from its nearest place; the places inside are break points, and so are the middles
+    between them.
+    """
     points[0], found = start, 1
-    for piece in range(pieces):
-        a, top = forced[piece], 0
-        stack[0] = forced[piece + 1]
-        while top >= 0:
-            b = stack[top]
-            if b - a <= 1.0001 * min(cap, _longest(a, b, singular, smallest, count, width)) or top == 127:
-                points[found] = b
-                found, a, top = found + 1, b, top - 1
-            else:
-                top += 1
-                stack[top] = 0.5 * (a + b)
+    tiny = 1e-9 * (stop - start)
+    here = start
+    for k in range(count):
+        last = stop if k == count - 1 else min(0.5 * (places[k] + places[k + 1]), stop)
+        if here < places[k] - tiny and places[k] < stop - tiny:
+            found = _divide_piece(here, places[k], places[k], law, scales[k], cap, points, found)
+            here = places[k]
+        elif abs(here - places[k]) <= tiny:
+            here = points[found - 1]
+        if here < last - tiny:
+            found = _divide_piece(here, last, places[k], law, scales[k], cap, points, found)
+            here = last
     return found
 
 
@@ -111,18 +151,20 @@ def divide_edges(kind, ends, corner, width, smallest, cap):  # type: ignore[no-u
     m = kind.size
     starts = np.zeros(m + 1, dtype=np.int64)
     points = np.empty(16 * m + 1024)
-    singular, size = np.empty(3), np.empty(3)
-    buffer = np.empty(1024)
+    places, scales = np.empty(3), np.empty(3)
+    buffer = np.empty(4096)
     for e in range(m):
-        count = 0
-        if kind[e] >= CUT:
-            singular[0], singular[1], count = -corner[e], corner[e], 2
-            size[0] = size[1] = smallest[e, 0]
-        if kind[e] == TOUCHING or (kind[e] == NECK and width[e] == 0.0):
-            singular[count], size[count] = 0.0, smallest[e, 1]
-            count += 1
-        opening = width[e] if kind[e] == GAP else 0.0
-        found = divide_edge(ends[e, 0], ends[e, 1], cap[e], singular, size, count, opening, buffer)
+        law, count = 0, 1
+        places[0], scales[0] = 0.0, smallest[e, 1]
+        if kind[e] == GAP:
+            law, scales[0] = 1, width[e]
+        elif kind[e] >= CUT:
+            count = 2
+            if kind[e] == NECK and width[e] == 0.0:
+                places[1], scales[1], count = 0.0, smallest[e, 1], 3
+            places[0], places[count - 1] = -corner[e], corner[e]
+            scales[0] = scales[count - 1] = smallest[e, 0]
+        found = divide_edge(ends[e, 0], ends[e, 1], cap[e], places, scales, count, law, buffer)
         begin = starts[e]
         if begin + found > points.size:
             more = np.empty(2 * points.size + 1024)

@@ -75,9 +75,7 @@ class CellSolution:
         return float(reactions[low].sum()), -float(reactions[far].sum())
 
 
-def build_model(
-    geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution | None = None
-) -> CellModel:
+def build_model(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution | None = None) -> CellModel:
     """Reduce and assemble the cells for one set of conductivities.
 
     Parameters
