@@ -40,7 +40,7 @@ def check(seed):
     )
     assert np.isfinite(found).all()
     above = found / found[-1] - 1.0
-    limits = np.array([0.2, 0.1, 0.02, 0.012, 0.0])
+    limits = np.array([0.3, 0.05, 0.02, 0.006, 0.0])
     assert (above < limits[:, None] + 1e-12).all(), (seed, above)
     assert (above > -0.002).all(), (seed, above)
     if fraction is not None and all(box.periodic):
@@ -56,4 +56,4 @@ def test_a_dozen_polydisperse_packings_have_no_outlier():
 
 @pytest.mark.slow
 def test_two_hundred_polydisperse_packings_have_no_outlier():
-    assert sum(check(seed) for seed in range(200, 400)) >= 170
+    assert sum(check(seed) for seed in range(200, 400)) > 150

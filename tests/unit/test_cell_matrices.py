@@ -118,13 +118,13 @@ def test_elimination_gives_the_schur_complement_and_the_inner_unknowns(inner):
     assert np.allclose(values[:inner], expected, rtol=1e-11)
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("degree", range(1, 9))
 def test_edge_polynomials_reproduce_their_degree(degree):
-    points, values = lobatto_points(degree), np.empty(6)
+    points, values = lobatto_points(degree), np.empty(9)
     coefficients = np.random.default_rng(25).normal(size=degree + 1)
     nodal = np.polynomial.polynomial.polyval(points, coefficients)
     order = np.concatenate(([0, degree], np.arange(1, degree)))
-    lagrange_values(0.3, points, values)
+    lagrange_values(0.3, degree, values)
     assert values[: degree + 1] @ nodal[order] == pytest.approx(np.polynomial.polynomial.polyval(0.3, coefficients))
     weights = np.polynomial.legendre.legval(points, np.eye(degree + 1)[degree]) ** -2.0 * 2.0 / degree / (degree + 1)
     assert weights @ points ** (2 * degree - 2) == pytest.approx(2.0 / (2 * degree - 1))  # the rule of these points

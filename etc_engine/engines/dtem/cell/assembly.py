@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix
 
 from etc_engine.engines.dtem.cell.edges import CellEdges
 from etc_engine.engines.dtem.cell.element import reduce_cell, workspace
-from etc_engine.engines.dtem.cell.frame import Frame, lobatto_points
+from etc_engine.engines.dtem.cell.frame import Frame
 from etc_engine.engines.dtem.cell.rim_grid import EdgeGrid
 from etc_engine.structure.laguerre_2d import LaguerreCells
 
@@ -79,12 +79,12 @@ def assemble_cells(
     data = np.zeros(indices.size)
     loads, energy = np.zeros((frame.count, 2)), np.zeros((2, 2))
     nodes = rim_nodes(cells, grid)
-    work = workspace(int(nodes.max()), int(np.diff(cells.starts).max()), frame.degree)
+    work = workspace(int(nodes.max()), int(np.diff(cells.starts).max()), int(np.diff(frame.starts).max()))
     _assemble(
         (cells.starts, cells.edges, cells.forward),
         edges,
         grid,
-        (frame.starts, frame.unknowns, frame.positions, lobatto_points(frame.degree)),
+        (frame.starts, frame.unknowns, frame.positions, frame.degrees),
         materials,
         work,
         (indptr, indices, data, loads, energy),
@@ -112,11 +112,11 @@ def _pattern(frame: Frame, count: int) -> tuple[NDArray[np.int32], NDArray[np.in
 
 @njit(cache=True)
 def _assemble(cells, edges, grid, frame, materials, work, system):  # type: ignore[no-untyped-def]
-    starts, unknowns, positions, lobatto = frame
+    starts, unknowns, positions, degrees = frame
     indptr, indices, data, loads, energy = system
     matrix = work[2]
     for i in range(cells[0].size - 1):
-        _, inner, size = reduce_cell(i, cells, edges, grid, lobatto, materials, work)
+        _, inner, size = reduce_cell(i, cells, edges, grid, degrees, materials, work)
         mine = unknowns[starts[i] : starts[i + 1]]
         places = positions[starts[i] : starts[i + 1]]
         for a in range(inner, size):

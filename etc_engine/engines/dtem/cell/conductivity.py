@@ -89,8 +89,9 @@ def cell_conductivity(
 
     Notes
     -----
-    Errors against two-sided bounds are at most .55 % at degree 3 and .35 % at degree 4 on periodic packings, and .8 %
-    on twelve particles between walls. Where some disks conduct better and others worse than the fluid, neither
+    Errors against two-sided bounds are at most .3 % on seven periodic packings at contrast 2 to 1e4, and .8 % on twelve
+    particles between walls. On loose packings whose disks overlap in clusters degree 3 was up to 1.3 % above degree 5,
+    degree 4 up to .3 %. Where some disks conduct better and others worse than the fluid, neither
     form is good; the mean of both is returned, with their difference.
 
     References

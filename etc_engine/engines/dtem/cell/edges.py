@@ -163,7 +163,7 @@ def _refuse_wide(cells: LaguerreCells, kind: Ints, corners: Floats) -> None:
 
 
 def grid_edges(
-    edges: CellEdges, ratio: Floats, degree: int, *, corner: float = CORNER, longest: float = LONGEST
+    edges: CellEdges, ratio: Floats, degrees: Ints, *, corner: float = CORNER, longest: float = LONGEST
 ) -> EdgeGrid:
     """Divide the edges.
 
@@ -172,8 +172,8 @@ def grid_edges(
     edges : CellEdges
     ratio : ndarray, shape (m,)
         k_f over the larger k_s on both sides: it sets the smallest interval at touching points.
-    degree : int
-        An edge gets at least as many intervals.
+    degrees : ndarray of int64, shape (m,)
+        An edge gets at least as many intervals as its degree.
     corner : float
         Smallest interval at the ends of a contact, in half-widths.
     longest : float
@@ -186,7 +186,7 @@ def grid_edges(
     fine = np.clip(ratio, FINEST, 0.3) * edges.smaller
     at_corner = np.where(ratio > 0.5, np.maximum(fine, corner * edges.corners), corner * edges.corners)
     at_middle = np.where(edges.kind == NECK, 0.5 * edges.corners, fine * corner / CORNER)
-    cap = np.minimum(longest * edges.smaller, 1.0001 * (edges.ends[:, 1] - edges.ends[:, 0]) / degree)
+    cap = np.minimum(longest * edges.smaller, 1.0001 * (edges.ends[:, 1] - edges.ends[:, 0]) / degrees)
     widths = np.where(edges.kind == GAP, np.maximum(edges.widths, fine), edges.widths)
     starts, points = divide_edges(
         edges.kind, edges.ends, edges.corners, widths, np.column_stack((at_corner, at_middle)), cap

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from etc_engine.engines.dtem.cell.elimination import eliminate_dense, solve_cyclic
-from etc_engine.engines.dtem.cell.frame import MOST_DEGREES, lagrange_values
+from etc_engine.engines.dtem.cell.frame import HIGHEST, lagrange_values
 from etc_engine.engines.dtem.cell.rim import disk_energy
 from etc_engine.engines.dtem.cell.rim_grid import BONDED, CUT, NECK, TOUCHING
 from etc_engine.engines.dtem.cell.strip import FIELDS, corner_exponent, strip_matrix
@@ -39,14 +39,13 @@ def own_coordinate(sigma, start, stop, corner, own):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def place_rim(i, cells, edges, grid, lobatto, rim):  # type: ignore[no-untyped-def]
+def place_rim(i, cells, edges, grid, degrees, rim):  # type: ignore[no-untyped-def]
     """Rim nodes of cell i: angle, side, common and own coordinate, frame weights. Returns how many.
 
     ``rim`` is (angles, side of node, edge of side, forward, sigma, own, weights).
     """
     starts, side_edges, side_forward = cells
     angles, sides, edge_of, forward, sigmas, owns, weights = rim
-    degree = lobatto.size - 1
     count = 0
     for side in range(starts[i + 1] - starts[i]):
         e = side_edges[starts[i] + side]
@@ -69,13 +68,12 @@ def place_rim(i, cells, edges, grid, lobatto, rim):  # type: ignore[no-untyped-d
                     direction -= 2.0 * math.pi
             angles[count] = direction + turn
             sides[count], sigmas[count], owns[count] = side, sigma, s
-            lagrange_values(2.0 * (sigma - start) / (stop - start) - 1.0, lobatto, weights[count])
+            weights[count, :] = 0.0
+            lagrange_values(2.0 * (sigma - start) / (stop - start) - 1.0, degrees[e], weights[count])
             if k == 0:
                 weights[count, :] = 0.0
                 weights[count, 0] = 1.0
             count += 1
-    for c in range(degree + 1, weights.shape[1]):
-        weights[:count, c] = 0.0
     return count
 
 
@@ -167,36 +165,36 @@ def _interval(c, following, i, edges, rim, materials, local):  # type: ignore[no
 
 
 @njit(cache=True)
-def reduce_cell(i, cells, edges, grid, lobatto, materials, work):  # type: ignore[no-untyped-def]
+def reduce_cell(i, cells, edges, grid, degrees, materials, work):  # type: ignore[no-untyped-def]
     """Eliminate the inner unknowns of cell i.
 
     Returns (rim nodes, inner dense unknowns, size). In ``work`` are left: the reduced dense matrix, whose block
     [inner:size, inner:size] is K (upper triangle), and T^-1 times the coupling of the bumps m to the dense unknowns.
     """
     rim, numbers, matrix, coupling, solved, first, second, local = work
-    count = place_rim(i, cells, edges, grid, lobatto, rim)
+    count = place_rim(i, cells, edges, grid, degrees, rim)
     inner = number_unknowns(count, edges, rim, numbers)
     polygon = cells[0][i + 1] - cells[0][i]
-    degree = lobatto.size - 1
-    size = inner + polygon * degree
-    columns = np.empty((polygon, MOST_DEGREES + 1), dtype=np.int64)
+    size = inner + polygon
+    columns = np.empty((polygon, HIGHEST + 1), dtype=np.int64)
     for side in range(polygon):
         columns[side, 0], columns[side, 1] = inner + side, inner + (side + 1) % polygon
-        for k in range(degree - 1):
-            columns[side, 2 + k] = inner + polygon + side * (degree - 1) + k
+        for k in range(degrees[rim[2][side]] - 1):
+            columns[side, 2 + k] = size
+            size += 1
     matrix[:size, :size] = 0.0
     coupling[:count, :size] = 0.0
-    _add_disk(count, rim, columns, numbers[0], materials[1][i], degree, matrix, first, second)
+    _add_disk(count, size, rim, columns, degrees, numbers[0], materials[1][i], matrix, first, second)
     diagonal, beside = np.zeros(count), np.zeros(count)
     places = (
-        np.zeros((FIELDS, MOST_DEGREES + 1), np.int64),
-        np.zeros((FIELDS, MOST_DEGREES + 1)),
+        np.zeros((FIELDS, HIGHEST + 1), np.int64),
+        np.zeros((FIELDS, HIGHEST + 1)),
         np.zeros(FIELDS, np.int64),
     )
     for c in range(count):
         d = c + 1 if c + 1 < count else 0
         fields = _interval(c, d, i, edges, rim, materials, local)
-        _spread(c, d, rim, numbers, columns, degree, places)
+        _spread(c, d, rim, numbers, columns, degrees, places)
         diagonal[c] += local[1, 1]
         diagonal[d] += local[3, 3]
         beside[c] += local[1, 3]
@@ -220,7 +218,7 @@ def reduce_cell(i, cells, edges, grid, lobatto, materials, work):  # type: ignor
 
 
 @njit(cache=True)
-def _spread(c, d, rim, numbers, columns, degree, places):  # type: ignore[no-untyped-def]
+def _spread(c, d, rim, numbers, columns, degrees, places):  # type: ignore[no-untyped-def]
     """Dense columns and weights of the coefficients of the interval from node c to d; bumps have none."""
     sides, weights = rim[1], rim[6]
     where, share, many = places
@@ -229,7 +227,7 @@ def _spread(c, d, rim, numbers, columns, degree, places):  # type: ignore[no-unt
         for field, number in ((2 * end, numbers[0][node]), (6 + end, numbers[1][node])):
             where[field, 0], share[field, 0], many[field] = number, 1.0, 1 if number >= 0 else 0
         field, found = 4 + end, 0
-        for k in range(degree + 1):
+        for k in range(degrees[rim[2][sides[node]]] + 1):
             if weights[node, k] != 0.0:
                 where[field, found], share[field, found] = columns[sides[node], k], weights[node, k]
                 found += 1
@@ -253,12 +251,11 @@ def _scatter(c, d, fields, local, places, matrix, coupling):  # type: ignore[no-
 
 
 @njit(cache=True)
-def _add_disk(count, rim, columns, of_rim, solid, degree, matrix, first, second):  # type: ignore[no-untyped-def]
+def _add_disk(count, size, rim, columns, degrees, of_rim, solid, matrix, first, second):  # type: ignore[no-untyped-def]
     """Add the energy of the disk, a form of T_rim = Phi F + W, to the upper triangle of the dense matrix."""
     sides, weights = rim[1], rim[6]
     disk_energy(rim[0], count, solid, first, second)
     begin = columns[0, 0]
-    size = begin + columns.shape[0] * degree
     product = first  # P = A Phi
     for i in range(count):
         for q in range(size - begin):
@@ -266,7 +263,7 @@ def _add_disk(count, rim, columns, of_rim, solid, degree, matrix, first, second)
         for j in range(count):
             value = second[i, j]
             side = sides[j]
-            for k in range(degree + 1):
+            for k in range(degrees[rim[2][side]] + 1):
                 product[i, columns[side, k] - begin] += value * weights[j, k]
     for i in range(count):
         row = of_rim[i]
@@ -277,7 +274,7 @@ def _add_disk(count, rim, columns, of_rim, solid, degree, matrix, first, second)
                     matrix[row, column] += second[i, j]
             for q in range(begin, size):
                 matrix[row, q] += product[i, q - begin]
-        for k in range(degree + 1):
+        for k in range(degrees[rim[2][sides[i]]] + 1):
             weight = weights[i, k]
             if weight != 0.0:
                 row = columns[sides[i], k]
@@ -285,9 +282,9 @@ def _add_disk(count, rim, columns, of_rim, solid, degree, matrix, first, second)
                     matrix[row, q] += weight * product[i, q - begin]
 
 
-def workspace(nodes: int, sides: int, degree: int) -> tuple:
-    """Room for `reduce_cell` on cells of at most so many rim nodes and sides."""
-    size = 2 * nodes + sides * degree
+def workspace(nodes: int, sides: int, frame: int) -> tuple:
+    """Room for `reduce_cell` on cells of at most so many rim nodes, sides and frame unknowns."""
+    size = 2 * nodes + frame
     rim = (
         np.empty(nodes),
         np.empty(nodes, np.int64),
@@ -295,17 +292,16 @@ def workspace(nodes: int, sides: int, degree: int) -> tuple:
         np.empty(sides, np.bool_),
         np.empty(nodes),
         np.empty(nodes),
-        np.zeros((nodes, MOST_DEGREES + 1)),
+        np.zeros((nodes, HIGHEST + 1)),
     )
     numbers = (np.empty(nodes, np.int64), np.empty(nodes, np.int64), np.empty(nodes, np.bool_))
-    wide = max(nodes, sides * degree)
     return (
         rim,
         numbers,
         np.empty((size, size)),
         np.empty((nodes, size)),
         np.empty((nodes, size)),
-        np.empty((nodes, wide)),
+        np.empty((nodes, max(nodes, frame))),
         np.empty((nodes, nodes)),
         np.empty((FIELDS, FIELDS)),
     )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from etc_engine.box import Box
 from etc_engine.engines.dtem.cell.edges import CellEdges, EdgeContacts, cell_edges, grid_edges
-from etc_engine.engines.dtem.cell.frame import MOST_DEGREES, Frame, build_frame
+from etc_engine.engines.dtem.cell.frame import MOST_DEGREES, Frame, build_frame, edge_degrees
 from etc_engine.engines.dtem.cell.rim_grid import CORNER, LONGEST, EdgeGrid
 from etc_engine.errors import InputError
 from etc_engine.structure.laguerre_2d import LaguerreCells, laguerre_cells
@@ -104,5 +104,7 @@ def divide(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Reso
     pairs = geometry.cells.cells
     other = np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
     ratio = fluid / np.maximum(solid[pairs[:, 0]], solid[other])
-    grid = grid_edges(geometry.edges, ratio, resolution.degree, corner=resolution.corner, longest=resolution.longest)
-    return grid, build_frame(geometry.cells, resolution.degree)
+    edges = geometry.edges
+    degrees = edge_degrees(edges.ends[:, 1] - edges.ends[:, 0], edges.smaller, resolution.degree)
+    grid = grid_edges(edges, ratio, degrees, corner=resolution.corner, longest=resolution.longest)
+    return grid, build_frame(geometry.cells, degrees)

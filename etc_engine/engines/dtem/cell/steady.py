@@ -98,15 +98,13 @@ def build_model(geometry: CellGeometry, solid: Floats, fluid: float, resolution:
 
 def wall_unknowns(model: CellModel, wall: int) -> NDArray[np.int64]:
     """Frame unknowns on a wall; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end."""
-    cells, inner = model.geometry.cells, model.frame.degree - 1
-    edges = np.flatnonzero(cells.cells[:, 1] == -1 - wall)
+    cells, frame = model.geometry.cells, model.frame
     rows = np.flatnonzero(cells.cells[cells.edges, 1] == -1 - wall)
-    following = rows + 1
-    ends = cells.starts[np.searchsorted(cells.starts, rows, side="right")]
-    begins = cells.starts[np.searchsorted(cells.starts, rows, side="right") - 1]
-    following = np.where(following == ends, begins, following)
-    own = cells.vertex_count + edges[:, None] * inner + np.arange(inner)
-    return np.unique(np.concatenate((cells.vertices[rows], cells.vertices[following], own.ravel())))
+    end = np.searchsorted(cells.starts, rows, side="right")
+    following = np.where(rows + 1 == cells.starts[end], cells.starts[end - 1], rows + 1)
+    edges = cells.edges[rows]
+    own = [np.arange(frame.first[e], frame.first[e + 1]) for e in edges]
+    return np.unique(np.concatenate((cells.vertices[rows], cells.vertices[following], *own)))
 
 
 def solve_model(model: CellModel, axes: tuple[int, ...], *, tolerance: float = 1e-10) -> CellSolution:
