@@ -280,3 +280,71 @@ def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
     if method not in SELF_RESISTANCE:
         raise InputError(f"unknown method {method!r}: expected one of {', '.join(SELF_RESISTANCE)}")
     return SELF_RESISTANCE[method](alpha)
+
+
+def resistance_matrices(
+    offsets: NDArray[np.int64],
+    arms: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    method: str,
+    cutting: NDArray[np.bool_] | None = None,  # noqa: ARG001  (the interface of both laws)
+) -> NDArray[np.float64]:
+    """Resistance matrices kappa H of many disks, packed row by row one after the other.
+
+    Parameters
+    ----------
+    offsets : ndarray of int, shape (n + 1,)
+        Contacts of disk p: ``offsets[p]`` to ``offsets[p + 1]``.
+    arms : ndarray, shape (s, 2)
+        Directions of the contacts from the centre, of any length.
+    alpha : ndarray, shape (s,) [rad]
+    method : str
+        ``chord``, ``standard`` or ``enhanced``.
+    cutting : ndarray of bool, shape (s,), optional
+        Without effect: mutual resistances of disks do not know the segments cut off.
+
+    Returns
+    -------
+    ndarray, shape (sum of squared contact numbers,)
+        Dimensionless.
+
+    Examples
+    --------
+    >>> h = resistance_matrices(np.array([0, 2]), np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([0.1, 0.1]), "chord")
+    >>> h.reshape(2, 2).round(4).tolist()
+    [[1.1639, 0.0003], [0.0003, 1.1639]]
+    """
+    theta = np.arctan2(arms[:, 1], arms[:, 0])
+    starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
+    return _matrices(offsets, starts, theta, np.ascontiguousarray(alpha), self_resistance(alpha, method))
+
+
+@njit(cache=True)
+def _matrices(
+    offsets: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    own: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    values = np.empty(starts[-1])
+    for p in range(offsets.size - 1):
+        o, s, n = offsets[p], starts[p], offsets[p + 1] - offsets[p]
+        for i in range(n):
+            values[s + i * n + i] = own[o + i]
+            for j in range(i):
+                h = mutual_resistance_scalar(theta[o + i] - theta[o + j], alpha[o + i], alpha[o + j])
+                values[s + i * n + j] = h
+                values[s + j * n + i] = h
+    return values
+
+
+def first_moments(arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean unit direction over each arc, n sin(alpha)/alpha, shape (s, 2)."""
+    theta = np.arctan2(arms[:, 1], arms[:, 0])
+    return np.sinc(alpha / np.pi)[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+
+
+def segment_area(alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area behind a chord of half-angle alpha, alpha - sin alpha cos alpha, of the unit disk."""
+    return np.asarray(alpha - np.sin(alpha) * np.cos(alpha))
