@@ -199,7 +199,8 @@ def facet_resistances(
     added[ringed] = condensed.gaps * mirrored[ringed] * half[ringed]
     lengths = np.concatenate([np.linalg.norm(links.branches, axis=1), links.wall_distances])[sides.links]
     tubes = sides.columns > 0.0
-    added[tubes] = lengths[tubes] / (material.fluid[sides.links[tubes]] * sides.columns[tubes]) * half[tubes]
+    open_lengths = lengths + 2.0 * material.jumps[sides.links]  # open pores are about half as wide as the spheres
+    added[tubes] = open_lengths[tubes] / (material.fluid[sides.links[tubes]] * sides.columns[tubes]) * half[tubes]
     starts = packed_starts(sides.offsets)
     values = np.zeros(int(starts[-1]))
     l = np.arange(1, TERMS + 1)
