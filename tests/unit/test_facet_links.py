@@ -228,3 +228,20 @@ def test_hidden_spheres_and_bad_material_are_refused():
         facet_conductivity(links, uniform_material(links, 10.0, 0.0))
     with pytest.raises(InputError, match="contact resistance"):
         facet_links(overlap_contacts(lattice("bcc", 2.01)), -1.0)
+
+
+def test_rarefied_gas_goes_to_vacuum_and_to_the_continuum():
+    """p -> inf: jumps vanish. p -> 0: gas carries nothing, what is left is radiation alone, also in the columns."""
+    packing = random_packing("rp5.csv")
+    links = facet_links(overlap_contacts(packing))
+    continuum = facet_conductivity(links, uniform_material(links, 100.0, 1.0)).tensor
+    dense = uniform_material(links, 100.0, 1.0, jumps=1e-9, open_fluid=1.0 - 1e-9)
+    np.testing.assert_allclose(facet_conductivity(links, dense).tensor, continuum, rtol=1e-6, atol=1e-9)
+    glow = facet_conductivity(links, uniform_material(links, 100.0, 0.0, radiation=0.5)).tensor
+    thin = uniform_material(links, 100.0, 1.0, jumps=1e9, radiation=0.5, open_fluid=1e-9)
+    np.testing.assert_allclose(facet_conductivity(links, thin).tensor, glow, rtol=1e-5, atol=1e-6)
+    k = [
+        np.trace(facet_conductivity(links, uniform_material(links, 100.0, 1.0, jumps=j)).tensor)
+        for j in (0.0, 1e-3, 1e-2, 1e-1)
+    ]
+    assert (np.diff(k) < 0.0).all()
