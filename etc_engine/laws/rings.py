@@ -382,7 +382,7 @@ def _solve_ones(a: NDArray[np.float64], n: int, x: NDArray[np.float64]) -> None:
         x[i] /= a[i, i]
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def legendre_means(row: NDArray[np.float64], side: int, shape: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """a_l = sum_k w_k A_l(mode k) of one side, l = 1 .. out.size, into ``out``.
 
