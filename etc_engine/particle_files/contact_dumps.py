@@ -189,8 +189,8 @@ def _check_places(table: ParticleTable, contacts: ContactTable, rows: NDArray[np
             first = known[bad[0]]
             there = contacts.columns["pos"][first, 3 * side : 3 * side + 3].tolist()
             raise InputError(
-                f"{contacts.place} has particle {contacts.ids[first, side]} at {there}, {apart[bad[0]]:.3g} m from where "
-                "the particles have it: give the frame of the same time step"
+                f"{contacts.place} has particle {contacts.ids[first, side]} at {there}, {apart[bad[0]]:.3g} m from "
+                "where the particles have it: give the frame of the same time step"
             )
 
 
