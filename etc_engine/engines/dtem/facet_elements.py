@@ -29,7 +29,7 @@ from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.rings import FacingSpheres, condense_pairs, legendre_means
 from etc_engine.medium.facets import FacetLinks
 
-TERMS = 100
+TERMS = 64
 """Legendre terms between two facets, L."""
 
 
@@ -48,7 +48,9 @@ class FacetMaterial:
     conductivity : ndarray, shape (n,) [W/(m K)]
         Of each sphere.
     fluid : ndarray, shape (m + w,) [W/(m K)]
-        Conductivity of the fluid in each link, between spheres first, at walls after them.
+        Conductivity of the continuum fluid in each link, between spheres first, at walls after them.
+    open_fluid : ndarray, shape (m + w,) [W/(m K)]
+        Of the fluid in the open pore beyond the spheres, the columns; below `fluid` where the gas is rarefied.
     jumps : ndarray, shape (m + w,) [m]
         Temperature jump lengths of a link, both surfaces together.
     radiation : ndarray, shape (m + w,) [W/(m2 K)]
@@ -57,6 +59,7 @@ class FacetMaterial:
 
     conductivity: NDArray[np.float64]
     fluid: NDArray[np.float64]
+    open_fluid: NDArray[np.float64]
     jumps: NDArray[np.float64]
     radiation: NDArray[np.float64]
 
@@ -199,7 +202,7 @@ def facet_resistances(
     added[ringed] = condensed.gaps * mirrored[ringed] * half[ringed]
     lengths = np.concatenate([np.linalg.norm(links.branches, axis=1), links.wall_distances])[sides.links]
     tubes = sides.columns > 0.0
-    added[tubes] = lengths[tubes] / (material.fluid[sides.links[tubes]] * sides.columns[tubes]) * half[tubes]
+    added[tubes] = lengths[tubes] / (material.open_fluid[sides.links[tubes]] * sides.columns[tubes]) * half[tubes]
     starts = packed_starts(sides.offsets)
     values = np.zeros(int(starts[-1]))
     l = np.arange(1, TERMS + 1)
@@ -228,7 +231,7 @@ def _repair(links: FacetLinks, material: FacetMaterial) -> NDArray[np.float64]:
     sine = np.minimum(np.concatenate([rho, rho, at_walls]) / radii[owner], 1.0)
     weight = 0.5 * (1.0 - (1.0 - sine**2) ** 1.5)
     overlap = np.empty((n, 3, 3))
-    fluid = np.concatenate([material.fluid[: links.count], material.fluid])
+    fluid = np.concatenate([material.open_fluid[: links.count], material.open_fluid])
     for a in range(3):
         for b in range(a + 1):
             overlap[:, a, b] = np.bincount(owner, weight * normals[:, a] * normals[:, b], minlength=n)

@@ -88,8 +88,11 @@ def uniform_material(
     fluid: ArrayLike,
     jumps: ArrayLike = 0.0,
     radiation: ArrayLike = 0.0,
+    open_fluid: ArrayLike | None = None,
 ) -> FacetMaterial:
     """Material from one number, or one per sphere (conductivity) and per link (the rest).
+
+    ``open_fluid`` is the conductivity of the fluid beyond the spheres; that of the gaps if left out.
 
     Raises
     ------
@@ -100,6 +103,7 @@ def uniform_material(
     values = {
         "conductivity of the spheres": (conductivity, n),
         "pore conductivity": (fluid, m),
+        "conductivity of the open pore": (fluid if open_fluid is None else open_fluid, m),
         "temperature jump": (jumps, m),
         "radiative conductance": (radiation, m),
     }
@@ -154,7 +158,7 @@ def solve_facets(
     -----
     Conjugate gradients, preconditioned by the elements as stars (`etc_engine.solvers.star`): 2 to 20 iterations.
     """
-    sides = facet_sides(links, driven_facets(links, axes), bool((material.fluid > 0.0).all()))
+    sides = facet_sides(links, driven_facets(links, axes), bool((material.open_fluid > 0.0).all()))
     starts, resistances = facet_resistances(links, material, sides)
     elements = facet_elements(sides, starts, resistances)
     system = assemble(elements, *_prescribe(links, sides, axes))
