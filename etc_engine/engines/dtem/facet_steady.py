@@ -178,9 +178,10 @@ def _prescribe(
     if links.packing.box.periodic[axes[0]]:
         prescribed[0] = True
         return sides.arms[:, list(axes)], prescribed
-    prescribed[sides.between :] = True
+    wall = sides.links >= links.count
+    prescribed[wall] = True
     hot = np.zeros(sides.links.size)
-    hot[sides.between :] = 1.0 - links.walls[sides.links[sides.between :] - links.count] % 2
+    hot[wall] = 1.0 - links.walls[sides.links[wall] - links.count] % 2
     return hot[sides.nodes, None], prescribed
 
 
@@ -264,7 +265,7 @@ def facet_conductivity(
 def _wall_flows(solution: FacetSolution) -> tuple[float, float]:
     """Heat flow into the spheres at the low wall and out of them at the far wall [W]."""
     sides = solution.sides
-    at_wall = sides.nodes >= sides.between
+    at_wall = sides.links[sides.nodes] >= solution.links.count
     hot = at_wall & (solution.temperatures[:, 0] == 1.0)
     return float(solution.heat_flows[hot, 0].sum()), -float(solution.heat_flows[at_wall & ~hot, 0].sum())
 
