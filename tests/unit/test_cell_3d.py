@@ -141,7 +141,7 @@ def test_facet_meshes_tile_the_facet_and_keep_circles():
     corners = np.array([[1.0, -0.8], [0.9, 0.9], [-1.1, 0.7], [-0.8, -1.0]])
     boundary = boundary_nodes(corners, np.array([2, 2, 2, 2]))
     levels = np.array([0.5, 1.0, 1.3, 2.0])
-    level, ray, inner = node_levels(levels, 8, True)
+    level, ray, inner = node_levels(levels, 8)
     triangles, on_disk = fan_triangles(8, levels, True)
     nodes = node_positions(boundary, np.zeros(2), levels, 0.4, level, ray)
     assert sorted(set(triangles.ravel())) == list(range(len(nodes)))

@@ -122,7 +122,7 @@ def side_energy(corners, edges, bubbles, mesh, side, tables):  # type: ignore[no
     heights, own_disk, medium, conductance = side
     boundary = boundary_nodes(corners, edges[0])
     pieces = len(boundary) // 2
-    level, ray, inner = node_levels(levels, pieces, contact)
+    level, ray, inner = node_levels(levels, pieces)
     triangles, on_disk = fan_triangles(pieces, levels, contact)
     common = node_positions(boundary, center, levels, circle, level, ray)
     basis = face_basis(common, triangles, inner, edges, bubbles, rule)
