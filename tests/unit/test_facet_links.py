@@ -19,6 +19,7 @@ from etc_engine.engines.dtem.facet_steady import (
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.medium.facets import facet_links
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.models.lattice_sums import BCC, FCC, coupling
 from etc_engine.packing.particles import ParticlePacking
 
 DATA = Path(__file__).parent.parent / "published" / "data" / "spheres"
@@ -172,6 +173,31 @@ def test_radiation_and_rarefied_gas_reach_every_link():
         np.trace(conductivity(packing, 100.0, jumps=0.01)) < k < np.trace(conductivity(packing, 100.0, radiation=5.0))
     )
     assert np.trace(conductivity(packing, 100.0, 0.0, radiation=5.0)) > 0.0
+
+
+def multipole_sum(name, contrast, jump, gap, highest=61):
+    """k/k_f of an array with a temperature jump T_s - T_f = jump dT/dn at the surfaces (radius 1).
+
+    Inside, multipole l has T = A r^l; with the jump the fluid at the surface sees the conductivity
+    kappa/(1 + l jump kappa/k_f), for every l its own. All else is the multipole expansion of the array.
+    """
+    coefficients, l = coupling({"bcc": BCC, "fcc": FCC}[name], highest)
+    seen = contrast / (1.0 + contrast * l * jump)
+    beta = l * (seen - 1.0) / (l * seen + l + 1.0)
+    gain, size = (2.0 / (2.0 + gap)) ** (l + 0.5), 2.0 / (2.0 + gap)
+    matrix = np.eye(l.size) - (beta * gain)[:, None] * coefficients * gain
+    dipole = np.linalg.solve(matrix, np.where(np.arange(l.size) == 0, beta, 0.0))[0]
+    x = dipole * {"bcc": BCC, "fcc": FCC}[name].touching_fraction * size**3
+    return (1.0 + 2.0 * x) / (1.0 - x)
+
+
+@pytest.mark.parametrize("name", ["bcc", "fcc"])
+@pytest.mark.parametrize(("jump", "tolerance"), [(1e-3, 0.011), (0.01, 0.018), (0.1, 0.046), (0.3, 0.035)])
+def test_rarefied_gas_against_multipole_sums_with_jumps(name, jump, tolerance):
+    for contrast in (10.0, 1e3):
+        for gap in (0.1, 0.02):
+            k = conductivity(lattice(name, 2.0 + gap), contrast, jumps=2.0 * jump)[0, 0]
+            assert k == pytest.approx(multipole_sum(name, contrast, jump, gap), rel=tolerance)
 
 
 def test_low_coordination_is_reported():
