@@ -15,24 +15,31 @@ from etc_engine.medium.network import ContactNetwork
 
 @dataclass(frozen=True, eq=False)
 class InsulatedCuts:
-    """Chords at which insulated walls cut disks.
+    """Contacts at which insulated walls cut particles.
 
     Parameters
     ----------
     particles : ndarray of int, shape (c,)
     walls : ndarray of int, shape (c,)
         Row of the cut among the wall contacts of the network.
-    theta, alpha : ndarray, shape (c,) [rad]
-        Position angle and half-angle of each cut.
+    arms : ndarray, shape (c, d)
+        Unit direction of each cut.
+    alpha : ndarray, shape (c,) [rad]
+        Its half-angle.
     """
 
     particles: NDArray[np.int64]
     walls: NDArray[np.int64]
-    theta: NDArray[np.float64]
+    arms: NDArray[np.float64]
     alpha: NDArray[np.float64]
 
+    @property
+    def theta(self) -> NDArray[np.float64]:
+        """Position angle of each cut of a disk, shape (c,) [rad]."""
+        return np.arctan2(self.arms[:, 1], self.arms[:, 0])
 
-NO_CUTS = InsulatedCuts(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
+
+NO_CUTS = InsulatedCuts(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +103,20 @@ def insulated_cuts(network: ContactNetwork, driven: NDArray[np.bool_]) -> Insula
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional.
     driven : ndarray of bool, shape (w,)
     """
     if not network.geometric:
         return NO_CUTS
     rows = np.flatnonzero(~driven)
-    towards = np.array([np.pi, 0.0, -0.5 * np.pi, 0.5 * np.pi])
-    return InsulatedCuts(network.wall_particles[rows], rows, towards[network.walls[rows]], network.wall_angles[rows])
+    arms = wall_normals(network.walls[rows], network.packing.dimension)
+    return InsulatedCuts(network.wall_particles[rows], rows, arms, network.wall_angles[rows])
+
+
+def wall_normals(walls: NDArray[np.int64], dimension: int) -> NDArray[np.float64]:
+    """Outward unit normals of walls, shape (w, d)."""
+    normals = np.zeros((walls.size, dimension))
+    normals[np.arange(walls.size), walls // 2] = 2.0 * (walls % 2) - 1.0
+    return normals
 
 
 def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> ContactSides:
@@ -111,8 +124,7 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
     packing, m = network.packing, network.count
     radii = packing.radii[network.pairs]
     share = radii[:, :1] / radii.sum(axis=1, keepdims=True)
-    normals = np.zeros((network.walls.size, packing.dimension))
-    normals[np.arange(network.walls.size), network.walls // 2] = 2.0 * (network.walls % 2) - 1.0
+    normals = wall_normals(network.walls, packing.dimension)
     owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
     nodes = np.concatenate([np.arange(m), np.arange(m), m + np.arange(network.walls.size)])
     arms = np.concatenate(

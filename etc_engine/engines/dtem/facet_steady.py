@@ -71,6 +71,12 @@ class FacetSolution:
         clusters = np.zeros(self.links.packing.count, dtype=np.int64)
         return Backbone(np.ones(self.links.count, dtype=np.bool_), driven, clusters, (True,) * len(self.axes))
 
+    def wall_heat(self) -> tuple[float, float]:
+        """Heat flow into the spheres at the low wall and out of them at the far one [W]."""
+        at_wall = self.sides.links[self.sides.nodes] >= self.links.count
+        hot = at_wall & (self.temperatures[:, 0] == 1.0)
+        return float(self.heat_flows[hot, 0].sum()), -float(self.heat_flows[at_wall & ~hot, 0].sum())
+
     @cached_property
     def sphere_temperatures(self) -> NDArray[np.float64]:
         """Mean temperature of every sphere, T_o = T_i - sum_j H_ij Q_j of its first facet, shape (n, k) [K]."""
@@ -178,9 +184,10 @@ def _prescribe(
     if links.packing.box.periodic[axes[0]]:
         prescribed[0] = True
         return sides.arms[:, list(axes)], prescribed
-    prescribed[sides.between :] = True
+    wall = sides.links >= links.count
+    prescribed[wall] = True
     hot = np.zeros(sides.links.size)
-    hot[sides.between :] = 1.0 - links.walls[sides.links[sides.between :] - links.count] % 2
+    hot[wall] = 1.0 - links.walls[sides.links[wall] - links.count] % 2
     return hot[sides.nodes, None], prescribed
 
 
@@ -257,16 +264,11 @@ def facet_conductivity(
     array([16.55, 16.55, 16.55])
     """
     return assemble_tensor(
-        links.packing.box, axes, lambda group: solve_facets(links, material, group, tolerance=tolerance), _wall_flows
+        links.packing.box,
+        axes,
+        lambda group: solve_facets(links, material, group, tolerance=tolerance),
+        FacetSolution.wall_heat,
     )
-
-
-def _wall_flows(solution: FacetSolution) -> tuple[float, float]:
-    """Heat flow into the spheres at the low wall and out of them at the far wall [W]."""
-    sides = solution.sides
-    at_wall = sides.nodes >= sides.between
-    hot = at_wall & (solution.temperatures[:, 0] == 1.0)
-    return float(solution.heat_flows[hot, 0].sum()), -float(solution.heat_flows[at_wall & ~hot, 0].sum())
 
 
 def low_coordination_warning(links: FacetLinks, material: FacetMaterial) -> str:

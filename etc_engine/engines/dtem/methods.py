@@ -15,8 +15,10 @@ from etc_engine.engines.dtem.closed_form import closed_form_elements, closed_for
 from etc_engine.engines.dtem.element import Elements, Material, Resistances
 from etc_engine.engines.dtem.exact import element as exact
 from etc_engine.engines.dtem.exact.element import exact_elements, exact_potentials
+from etc_engine.engines.dtem.exact.spheres import DEGREE, exact_sphere_elements, exact_sphere_potentials
 from etc_engine.errors import InputError
 from etc_engine.laws.by_dimension import LAWS
+from etc_engine.laws.sphere_modes import number_of_modes
 from etc_engine.medium.sides import ContactSides
 
 
@@ -31,13 +33,18 @@ class Method:
     potentials : callable
         (sides, material, flows of shape (s, modes)) -> arc temperatures above the particle's mean, shape (s,).
     modes : int
-        Flux modes of a contact, unless others are asked for; a method with 1 has no more.
+        Flux modes of a contact, unless others are asked for; a method with 1 has no more. On the disk between two
+        spheres ``modes`` stands for all modes of a degree below it.
     uniform_flux : bool
         Whether the flux is uniform over an arc; otherwise it follows Chebyshev modes over sqrt(1 - s^2).
     exact_cuts : bool
         Whether the disks lose what contacts and walls cut off: insulated walls and dead ends count then.
     resistances : callable, optional
         (sides, material, modes) -> Resistances, which a transient needs; None where the method has no such form.
+    most : int
+        Largest ``modes``: beyond it the matrices of an element lose their last digits.
+    count : callable
+        ``modes`` -> how many modes that are.
     """
 
     elements: Callable[[ContactSides, Material, int], Elements]
@@ -46,10 +53,9 @@ class Method:
     uniform_flux: bool
     exact_cuts: bool = False
     resistances: Callable[[ContactSides, Material, int], Resistances] | None = None
+    most: int = 10
+    count: Callable[[int], int] = int
 
-
-MOST_MODES = 10
-"""Beyond these the matrices of an element lose their last digits."""
 
 _CLOSED_FORMS = {
     name: Method(
@@ -68,7 +74,18 @@ METHODS: Mapping[str, Method] = {
 }
 METHODS_BY_DIMENSION: Mapping[int, Mapping[str, Method]] = {
     2: METHODS,
-    3: {name: _CLOSED_FORMS[name] for name in LAWS[3].self_resistances},
+    3: {
+        **{name: _CLOSED_FORMS[name] for name in LAWS[3].self_resistances},
+        "exact": Method(
+            exact_sphere_elements,
+            exact_sphere_potentials,
+            DEGREE + 1,
+            uniform_flux=False,
+            exact_cuts=True,
+            most=6,
+            count=lambda modes: number_of_modes(modes - 1),
+        ),
+    },
 }
 
 
@@ -95,11 +112,11 @@ def flux_modes(name: str, modes: int | None, dimension: int = 2) -> int:
     InputError
         If the method does not have them.
     """
-    own = find_method(name, dimension).modes
-    if modes is None or modes == own:
-        return own
-    if own == 1:
+    variant = find_method(name, dimension)
+    if modes is None or modes == variant.modes:
+        return variant.count(variant.modes)
+    if variant.modes == 1:
         raise InputError(f"method {name} has one flux mode a contact, found modes = {modes}: leave it out")
-    if not 1 <= modes <= MOST_MODES:
-        raise InputError(f"the number of flux modes must lie between 1 and {MOST_MODES}, found {modes}")
-    return modes
+    if not 1 <= modes <= variant.most:
+        raise InputError(f"the number of flux modes must lie between 1 and {variant.most}, found {modes}")
+    return variant.count(modes)
