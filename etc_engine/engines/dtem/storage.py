@@ -51,10 +51,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Elements, Material, cholesky_inverse, packed_starts
+from etc_engine.engines.dtem.element import Elements, Resistances, cholesky_inverse, packed_starts
 from etc_engine.engines.dtem.methods import find_method, flux_modes
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import ContactSides
 
 SHARE = 6.0 / 7.0
@@ -66,14 +65,19 @@ FROM_THIRDS = np.concatenate([np.full((1, 3), 1.0 / 3.0), np.sqrt(8.0) / 3.0 * _
 
 
 def storing_elements(
-    sides: ContactSides, material: Material, method: str, *, dipoles: bool = False, modes: int | None = None
+    sides: ContactSides,
+    conductivity: NDArray[np.float64],
+    method: str,
+    *,
+    dipoles: bool = False,
+    modes: int | None = None,
 ) -> Elements:
     """Elements of all disks over their contacts and their states, which are temperatures that store heat.
 
     Parameters
     ----------
     sides : ContactSides
-    material : Material
+    conductivity : ndarray, shape (n,) [W/(m K)]
     method : str
         A name of `etc_engine.engines.dtem.methods.METHODS`, but for ``exact``.
     dipoles : bool
@@ -85,7 +89,7 @@ def storing_elements(
     -------
     Elements
         Rows of a particle: its contacts, modes fastest, then its states. Nodes: M times the contact plus the mode, and
-        after all contacts the states by particle. ``modes`` is M. ``apply`` answers the heat into the particle at
+        after all contacts the states by particle. ``modes`` is M. ``apply`` returns the heat into the particle at
         the contacts, and what the states lose.
 
     Raises
@@ -98,7 +102,7 @@ def storing_elements(
     variant, modes = find_method(method), flux_modes(method, modes)
     if variant.resistances is None:
         raise InputError(f"method {method} has no transient form: choose chord, arc, standard or enhanced")
-    h = variant.resistances(sides, material, modes)
+    h = variant.resistances(sides, conductivity, modes)
     states = 3 if dipoles else 1
     count = sides.offsets.size - 1
     contact_rows = modes * np.diff(sides.offsets)
@@ -107,11 +111,8 @@ def storing_elements(
     values = np.zeros(int(starts[-1]))
     bad = _fill(
         modes * sides.offsets,
-        h.starts,
-        h.values,
-        h.moments,
-        modes,
-        material.conductivity,
+        h,
+        np.ascontiguousarray(conductivity),
         FROM_THIRDS if dipoles else np.ones((1, 1)),
         starts,
         values,
@@ -140,51 +141,24 @@ def _indefinite(particle: int, sides: ContactSides, method: str, dipoles: bool) 
     )
 
 
-def stored_areas(network: ContactNetwork, method: str) -> NDArray[np.float64]:
-    """Area of each disk that stores heat, its volume per unit thickness, shape (n,) [m2].
-
-    V = pi R^2 - sum_i R^2 (alpha_i - sin alpha_i cos alpha_i) over the contacts that cut the disk.
-
-    Parameters
-    ----------
-    network : ContactNetwork
-    method : str
-
-    Notes
-    -----
-    Geometric contacts, walls of all kinds included, cut the disk at their chords; so do prescribed ones with ``chord``.
-    With the other methods prescribed arcs cut nothing off. Segments are taken for disjoint, as contact arcs must be.
-    """
-    radii = network.packing.radii
-    areas = np.pi * radii**2
-    if network.geometric or method == "chord":
-        owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
-        alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
-        segments = alpha - np.sin(alpha) * np.cos(alpha)
-        areas -= radii**2 * np.bincount(owner, segments, minlength=radii.size)
-    return np.asarray(areas)
-
-
 @njit(cache=True)
 def _fill(
     offsets: NDArray[np.int64],
-    h_starts: NDArray[np.int64],
-    h_values: NDArray[np.float64],
-    moments: NDArray[np.float64],
-    modes: int,
+    h: Resistances,
     conductivity: NDArray[np.float64],
     readings: NDArray[np.float64],
     starts: NDArray[np.int64],
     values: NDArray[np.float64],
 ) -> int:
-    """Fill the packed matrices; answers the first particle without a positive definite one, or -1.
+    """Fill the packed matrices; returns the first particle without a positive definite one, or -1.
 
-    ``readings`` turns the states into (T_o) or (T_o, D_c, D_s).
+    A = (H' + e e^T/(8 pi kappa) - (6/7) sum_d u_d u_d^T/(pi kappa))^-1 and G = e W_0 + (6/7) sum_d u_d W_d, joined
+    to the element of `_join`. ``readings`` W turns the states into (T_o) or (T_o, D_c, D_s).
     """
-    states = readings.shape[0]
+    states, modes, moments = readings.shape[0], h.modes, h.moments
     for p in range(offsets.size - 1):
         first, n = offsets[p], offsets[p + 1] - offsets[p]
-        a = h_values[h_starts[p] : h_starts[p + 1]].copy().reshape((n, n))
+        a = h.values[h.starts[p] : h.starts[p + 1]].copy().reshape((n, n))
         scale = 1.0 / (np.pi * conductivity[p])
         g = np.zeros((n, states))  # temperature of each row by the states alone
         for i in range(n):
