@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.particle_options import SampleWords, particle_options, read_sample
+
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.medium import Medium
-    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.table import ParticleTable
     from etc_engine.realization import Engine
 
 LATTICE_PARTICLES = 20_000
@@ -24,8 +26,7 @@ LATTICE_PARTICLES = 20_000
 
 @click.command("homogenize")
 @click.argument("inclusions", type=click.Path(path_type=Path))
-@click.option("--box", help="Edge lengths, such as 1,1,1; only for CSV.")
-@click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
+@particle_options
 @click.option("--engine", default="voxel", show_default=True, help="voxel: FFT on voxels; lattice: particles.")
 @click.option("--method", help="Of voxel: laminate or binary, the kind of voxel; of lattice: laguerre or contact.")
 @click.option("--matrix", type=float, required=True, help="Conductivity of the matrix [W/(m K)].")
@@ -52,8 +53,7 @@ LATTICE_PARTICLES = 20_000
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def homogenize_command(
     inclusions: Path,
-    box: str | None,
-    frame: int | None,
+    words: SampleWords,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -80,14 +80,14 @@ def homogenize_command(
     boundary, engine = given["boundary"], find_engine(given.pop("engine"))
     if engine.needs_contacts:
         raise InputError(f"engine {engine.name} works on contacts: use the command solve")
-    table = _read(inclusions, box, frame, boundary)
+    table = read_sample(inclusions, words, unknown_periodic=boundary != "walls")
     if table.wrapped:
-        words = (
+        moved = (
             "1 centre lay outside the box and was"
             if table.wrapped == 1
             else (f"{table.wrapped} centres lay outside the box and were")
         )
-        click.echo(f"etc-engine: note: {words} wrapped into it", err=True)
+        click.echo(f"etc-engine: note: {moved} wrapped into it", err=True)
     medium = _medium(table, inclusions, given.pop("matrix"), given.pop("inclusion"))
     _warn_of_overlaps(medium)
     boundary = boundary or ("periodic" if all(medium.box.periodic) else "walls")
@@ -163,29 +163,6 @@ def _warn_of_overlaps(medium: Medium) -> None:
     click.echo(f"etc-engine: warning: {who} union counts once{divided if differ else ''}", err=True)
 
 
-def _read(path: Path, box: str | None, frame: int | None, boundary: str | None) -> ParticleTable:
-    """Inclusions from a file of any format; the box of a CSV file is periodic, unless walls are asked for."""
-    from etc_engine.box import AXES
-    from etc_engine.cli.options import parse_box
-    from etc_engine.errors import InputError
-    from etc_engine.particle_files.formats import format_to_read, read_particles
-
-    if not path.exists():
-        raise InputError(f"there is no file {path}")
-    kind = format_to_read(path)
-    if kind.brings_box:
-        if box is not None:
-            raise InputError(f"{path} is a {kind.name} that brings its own box: leave --box out")
-        return read_particles(path, frame=frame)
-    if box is None:
-        raise InputError("--box is missing: give the edge lengths of the box, such as --box 1,1,1")
-    if frame is not None:
-        raise InputError(f"--frame is only valid with a dump; {path} is none")
-    walled = parse_box(box, "")
-    periodic = "" if boundary == "walls" else AXES[: walled.dimension]
-    return read_particles(path, parse_box(box, periodic))
-
-
 def _threads() -> int:
     """Threads of this process, as the environment gives them to BLAS and OpenMP too."""
     word = os.environ.get("OMP_NUM_THREADS", "1")
@@ -224,7 +201,7 @@ def _write(files: ExitStack, path: Path | None, table: ParticleTable, medium: Me
     if path is None:
         return
     from etc_engine.box import AXES
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
     from etc_engine.durable.provenance import engine_version
     from etc_engine.particle_files.netcdf import packing_dataset
 
@@ -250,7 +227,7 @@ def _draw(
     files: ExitStack, path: Path, section: Any, task: tuple[Medium, str, dict[str, Any]], record: dict[str, Any]
 ) -> None:
     """A section, from one more solve that keeps the field."""
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
     from etc_engine.output.figures.voxel import save_section
 
     caption = f"k$_{{xx}}$ = {record['conductivity_tensor'][0, 0]:.6g} W/(m K), f = {record['volume_fraction']:.4f}"

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
 import click
 
 from etc_engine.box import Box, parse_periodic
+from etc_engine.durable.files import replacing
 from etc_engine.errors import InputError, OutputError
 
 
@@ -60,8 +58,19 @@ def check_picture(path: Path) -> None:
         raise InputError("pictures need matplotlib: install the extra with pip install 'etc-engine[plot]'")
 
 
-def check_place(path: Path, *inputs: Path) -> None:
-    """Refuse an output that cannot be written, or that is one of the inputs, before the work begins.
+RESULT_MARKS = (b"study_digest", b"study_file")
+"""Names of attributes that only the result of a whole study has."""
+
+
+def check_place(path: Path, *inputs: Path, replaces_result: bool = False) -> None:
+    """Refuse an output that cannot be written, or that would destroy an input or a result, before the work begins.
+
+    Parameters
+    ----------
+    path : Path
+    *inputs : Path
+    replaces_result : bool
+        Whether the command has asked the user already (``--overwrite``) before it replaces the result of a study.
 
     Raises
     ------
@@ -70,39 +79,23 @@ def check_place(path: Path, *inputs: Path) -> None:
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):
             raise OutputError(f"the output {path} is the input itself: it would be lost, choose another name")
+    if not replaces_result and _is_result(path):
+        raise OutputError(
+            f"{path} is the result of a sweep or a transient: it would be lost; choose another name, or remove it first"
+        )
     with replacing(path, keep=False):
         pass
 
 
-@contextmanager
-def replacing(path: Path | str, *, keep: bool = True) -> Iterator[Path]:
-    """A temporary neighbour of a file that takes its place when the block ends well, and vanishes otherwise.
-
-    With ``keep=False`` it vanishes in any case: a trial.
-
-    Raises
-    ------
-    OutputError
-        If the place cannot be written to.
-    """
-    path = Path(path)
-    if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a directory")
+def _is_result(path: Path) -> bool:
+    """Whether a file is the result of a study. Its bytes are searched: a damaged file may hang the netCDF library."""
+    if not path.is_file():
+        return False
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent or Path(), prefix=f".{path.name}.", suffix=path.suffix)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        if not keep:
-            return
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
+        with path.open("rb") as file:
+            if not file.read(8).startswith((b"\x89HDF", b"CDF")):
+                return False
+            with mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+                return any(content.find(mark) >= 0 for mark in RESULT_MARKS)
+    except (OSError, ValueError):
+        return False

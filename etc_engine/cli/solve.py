@@ -11,12 +11,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.particle_options import (
+    SampleWords,
+    particle_options,
+    read_sample,
+    warn_of_digits,
+    warn_of_excess,
+    warn_of_sample,
+)
+
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.field import ParticleField
     from etc_engine.medium.medium import Medium
     from etc_engine.medium.network import ContactNetwork
-    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.table import ParticleTable
     from etc_engine.realization import Engine
 
 BOND_GAP = 1e-6
@@ -24,9 +33,7 @@ BOND_GAP = 1e-6
 
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
-@click.option("--box", help="Edge lengths, such as 1,1; only for CSV.")
-@click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere; only for CSV.")
-@click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
+@particle_options
 @click.option("--axis", help="Load axis: x (the default), y, z or all.")
 @click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
 @click.option("--method", help="Of dtem: chord, standard, enhanced, arc or exact; of pipe: chord or uniform.")
@@ -59,9 +66,7 @@ BOND_GAP = 1e-6
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def solve_command(
     particles: Path,
-    box: str | None,
-    periodic: str | None,
-    frame: int | None,
+    words: SampleWords,
     output: Path | None,
     vtk: Path | None,
     plot: Path | None,
@@ -69,9 +74,10 @@ def solve_command(
 ) -> None:
     """Effective conductivity of the particles in a file.
 
-    PARTICLES is a CSV file with the columns x,y,radius[,conductivity], a LAMMPS/LIGGGHTS text dump, or a netCDF
-    (.nc) or VTK (.vtp) file as ``pack`` writes it; all but CSV bring their own box. Along the load axis the walls are
-    held at 1 (low end) and 0 (far end), unless the box is periodic along it.
+    PARTICLES is a CSV file with the columns x,y[,z],radius[,conductivity], a LAMMPS/LIGGGHTS text dump, a netCDF (.nc)
+    or VTK (.vtp) file as ``pack`` writes it, or a file of another DEM code (VTK, extended XYZ, YADE, MercuryDPM); -
+    is standard input. Along the load axis the walls are held at 1 (low end) and 0 (far end), unless the box is
+    periodic along it.
     """
     start = time.perf_counter()
     from etc_engine.cli.options import print_json
@@ -83,7 +89,7 @@ def solve_command(
     engine = find_engine(asked.engine)
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
-    table = _read(particles, box, periodic, frame)
+    table = read_sample(particles, words)
     medium = asked.medium(table, particles)
     axes = _load_axes(asked.axis, medium)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
@@ -93,6 +99,10 @@ def solve_command(
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
     _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
+    gap = 0.0 if asked.contact_angle is None else asked.bond_gap
+    warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
+    warn_of_sample(table, [axis for axis in axes if not medium.box.periodic[axis]], gap)
+    warn_of_excess(result.tensor, medium.conductivity)
     _write(outputs, field, record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
@@ -172,26 +182,6 @@ def _load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:
     return (AXES.index(word),)
 
 
-def _read(particles: Path, box: str | None, periodic: str | None, frame: int | None) -> ParticleTable:
-    """A particle file of any format, and its box if it brings none."""
-    from etc_engine.cli.options import parse_box
-    from etc_engine.errors import InputError
-    from etc_engine.particle_files.formats import format_to_read, read_particles
-
-    if not particles.exists():
-        raise InputError(f"there is no file {particles}")
-    kind = format_to_read(particles)
-    if frame is not None and not kind.has_frames:
-        raise InputError(f"--frame is only valid with a dump; {particles} is none")
-    if kind.brings_box:
-        if box is not None or periodic is not None:
-            raise InputError(f"{particles} is a {kind.name} that brings its own box: leave --box and --periodic out")
-        return read_particles(particles, frame=frame)
-    if box is None:
-        raise InputError("--box is missing: give the edge lengths of the box, such as --box 1,1")
-    return read_particles(particles, parse_box(box, periodic or ""))
-
-
 @dataclass(frozen=True)
 class _Outputs:
     """Files asked for."""
@@ -216,7 +206,7 @@ class _Outputs:
 
 def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any]) -> None:
     """Write what was asked for: every file whole, or none of them."""
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
 
     with ExitStack() as files:
         if outputs.netcdf is not None:

@@ -55,13 +55,14 @@ def transient_command(
 
 
 def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import check_place, replacing
+    from etc_engine.cli.options import check_place
+    from etc_engine.durable.files import replacing
     from etc_engine.study.meshless import run_study
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
             raise InputError(f"{name} goes with studies of kind 'network', this one is of kind 'meshless'")
-    check_place(wanted.output, wanted.study)
+    check_place(wanted.output, wanted.study, replaces_result=True)
     result = run_study(content)
     with replacing(wanted.output) as file:
         result.assign_attrs(study_file=wanted.text).to_netcdf(file)
@@ -70,8 +71,8 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
 
 
 def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import replacing
     from etc_engine.cli.progress import PackingProgress
+    from etc_engine.durable.files import replacing
     from etc_engine.output.series import series_dataset
     from etc_engine.study.transient import parse_study
     from etc_engine.transient.run import run_transient
@@ -133,7 +134,7 @@ def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
             raise OutputError(f"the frames of {wanted.vtk} go to the folder of the input: choose another name")
     for path in (wanted.output, wanted.plot, wanted.vtk):
         if path is not None:
-            check_place(path, *inputs)
+            check_place(path, *inputs, replaces_result=path == wanted.output)
 
 
 def _finish(study: NetworkStudy, wanted: Wanted) -> int:
@@ -153,7 +154,7 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
 
 def _draw(series: xarray.Dataset, wanted: Wanted) -> str:
     """Write the picture and the VTK series that are asked for; what was written, in words."""
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
     from etc_engine.output.series import write_vtk_series
 
     if wanted.plot is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.laws.shapes import self_resistance
+from etc_engine.laws.by_dimension import self_resistance
 from etc_engine.medium.conductivity import affine_conductivity
 from etc_engine.medium.medium import Medium, check_conductors
 from etc_engine.medium.sides import check_arcs, contact_sides
@@ -21,7 +21,7 @@ def contact_conductances(medium: Medium, law: str = "chord") -> tuple[NDArray[np
     medium : Medium
         With a contact network.
     law : str
-        Which self-resistance h_ii a particle has, see `etc_engine.laws.shapes.self_resistance`.
+        Which self-resistance h_ii a particle has, see `etc_engine.laws.by_dimension.self_resistance`.
 
     Returns
     -------

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import InputError
-from etc_engine.laws.shapes import ball_measure, segment_measure
+from etc_engine.laws.by_dimension import ball_measure, law_of
 from etc_engine.packing.particles import ParticlePacking
 
 LARGEST = 1e100
@@ -156,7 +156,7 @@ class ContactNetwork:
             return packing.measures
         owner = np.concatenate([self.pairs[:, 0], self.pairs[:, 1], self.wall_particles])
         alpha = np.concatenate([self.angles[:, 0], self.angles[:, 1], self.wall_angles])
-        cut = np.bincount(owner, segment_measure(alpha, packing.dimension), minlength=packing.count)
+        cut = np.bincount(owner, law_of(packing.dimension).cut(alpha), minlength=packing.count)
         return np.asarray(packing.measures - packing.radii**packing.dimension * cut)
 
     def select(self, contacts: NDArray[np.bool_], wall_contacts: NDArray[np.bool_]) -> ContactNetwork:

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.errors import GeometryError
+from etc_engine.laws.by_dimension import law_of
 from etc_engine.medium.network import ContactNetwork
 
 
@@ -55,6 +56,8 @@ class ContactSides:
     resistances : ndarray, shape (s,) [K/W, in 2D m K/W]
         Part of the contact's resistance that belongs to the side: half of it on either side of a particle contact,
         all of it on the one side of a wall contact.
+    radii : ndarray, shape (n,) [m]
+        Of the particles.
     of_contacts : ndarray of int, shape (m, 2)
         The two sides of each particle contact.
     of_walls : ndarray of int, shape (w,)
@@ -68,9 +71,15 @@ class ContactSides:
     arms: NDArray[np.float64]
     alpha: NDArray[np.float64]
     resistances: NDArray[np.float64]
+    radii: NDArray[np.float64]
     of_contacts: NDArray[np.int64]
     of_walls: NDArray[np.int64]
     cuts: InsulatedCuts = NO_CUTS
+
+    @property
+    def dimension(self) -> int:
+        """2 for disks, 3 for spheres."""
+        return int(self.arms.shape[1])
 
     @property
     def particles(self) -> NDArray[np.int64]:
@@ -136,6 +145,7 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
         arms=arms[order],
         alpha=alpha[order],
         resistances=resistances[order],
+        radii=packing.radii,
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],
         cuts=cuts,
@@ -161,8 +171,9 @@ def refuse_overlap(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha:
         particle = int(np.searchsorted(offsets, a, side="right")) - 1
         apart = 2.0 * np.degrees(np.arcsin(min(0.5 * float(np.linalg.norm(normals[a] - normals[b])), 1.0)))
         raise GeometryError(
-            f"two contact arcs of particle {particle} overlap: {apart:.4g} degrees apart with half-angles "
-            f"{np.degrees(alpha[a]):.4g} and {np.degrees(alpha[b]):.4g}; use smaller contact angles or less overlap"
+            f"two contact {law_of(arms.shape[1]).contact}s of particle {particle} overlap: {apart:.4g} degrees apart "
+            f"with half-angles {np.degrees(alpha[a]):.4g} and {np.degrees(alpha[b]):.4g}; use smaller contact angles "
+            f"or less overlap"
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from etc_engine.box import AXES
 from etc_engine.engines.dtem import conductivity as dtem
 from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.methods import METHODS as DTEM_METHODS
 from etc_engine.engines.dtem.transient import element_system
 from etc_engine.engines.lattice import homogenize as lattice
 from etc_engine.engines.pipe import steady as pipe
@@ -227,9 +228,10 @@ def _lattice_memory(_: Sequence[float], particles: float, options: Mapping[str, 
     return PARTICLE_BYTES * particles + NODE_BYTES * options["particles"]
 
 
-def _elements(description: str, *options: str) -> Method:
-    """A method of disks with a transient form."""
-    return Method(description, (2,), transient=True, options=("angle_curve", "dipoles", *options))
+def _elements(name: str, description: str, *options: str) -> Method:
+    """A method of thermal elements with a transient form."""
+    dimensions = DTEM_METHODS[name].dimensions
+    return Method(description, dimensions, transient=True, options=("angle_curve", "dipoles", *options))
 
 
 def _grid(description: str) -> Method:
@@ -250,10 +252,10 @@ ENGINES: Mapping[str, Engine] = {
             "dtem",
             "discrete thermal elements: particles with resistances between all of their contacts",
             {
-                "chord": _elements("contact chords, each exact for a far source"),
-                "standard": _elements("uniform flux over the contact arcs (Feng et al. 2008)"),
-                "enhanced": _elements("uniform flux with a tabulated correction (Feng et al. 2008)"),
-                "arc": _elements("flux over the contact arcs in modes", "modes"),
+                "chord": _elements("chord", "contact chords, each exact for a far source"),
+                "standard": _elements("standard", "uniform flux over the contact arcs (Feng et al. 2008)"),
+                "enhanced": _elements("enhanced", "uniform flux with a tabulated correction (Feng et al. 2008)"),
+                "arc": _elements("arc", "flux over the contact arcs in modes", "modes"),
                 "exact": Method("disks cut by their contacts, with two-sided bounds", (2,), options=("modes",)),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
@@ -266,8 +268,8 @@ ENGINES: Mapping[str, Engine] = {
             "pipe",
             "pipe network: particles at their mean temperatures, joined by the resistances of their contacts",
             {
-                "chord": Method("resistance of a contact chord", (2,), transient=True),
-                "uniform": Method("resistance under uniform flux (Feng et al. 2009)", (2,), transient=True),
+                "chord": Method("resistance of a contact chord", (2, 3), transient=True),
+                "uniform": Method("resistance under uniform flux (Feng et al. 2009)", (2, 3), transient=True),
             },
             lambda media, conduction, _: pipe.solve_series(media, conduction),
             system=pipe_system,

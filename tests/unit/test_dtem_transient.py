@@ -15,7 +15,7 @@ from etc_engine.box import Box
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.methods import find_method
 from etc_engine.engines.dtem.steady import solve_steady
-from etc_engine.engines.dtem.storage import FROM_THIRDS, storing_elements
+from etc_engine.engines.dtem.storage import readings_of_parts, storing_elements
 from etc_engine.engines.dtem.transient import dipole_amplitudes
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.disk import mutual_resistance, self_resistance
@@ -40,7 +40,9 @@ def one_disk(theta, alpha, resistance=0.0) -> ContactSides:
     n = theta.size
     arms = np.stack([np.cos(theta), np.sin(theta)], axis=1)
     no_contacts = np.zeros((0, 2), dtype=np.int64)
-    return ContactSides(np.array([0, n]), np.arange(n), arms, alpha, np.full(n, resistance), no_contacts, np.arange(n))
+    return ContactSides(
+        np.array([0, n]), np.arange(n), arms, alpha, np.full(n, resistance), np.ones(1), no_contacts, np.arange(n)
+    )
 
 
 def blocks(theta, alpha, method, dipoles, kappa=1.0, resistance=0.0, modes=None):
@@ -171,7 +173,7 @@ def test_a_dipole_decays_at_24_over_7_close_to_the_disks_own_rate():
     rates, vectors = np.linalg.eigh(3.0 * K_ss / np.pi)
     np.testing.assert_allclose(rates, [0.0, 24 / 7, 24 / 7], atol=1e-13)
     assert rates[2] == pytest.approx(jnp_zeros(1, 1)[0] ** 2, rel=0.012)
-    assert np.abs(FROM_THIRDS[1:] @ vectors[:, 0]).max() < 1e-15
+    assert np.abs(readings_of_parts(2)[1:] @ vectors[:, 0]).max() < 1e-15
 
 
 def critical_half_angle(contacts, dipoles):

@@ -178,9 +178,6 @@ def test_what_is_refused(random_network):
         pipe_conductivity(medium_of(random_network), method="round")
     with pytest.raises(InputError, match="the conductivity must be positive"):
         pipe_conductivity(medium_of(random_network, 0.0))
-    spheres = ParticlePacking([[0.5, 0.5, 0.5]], [0.5], Box((1.0, 1.0, 1.0)))
-    with pytest.raises(InputError, match="made of disks"):
-        pipe_conductivity(medium_of(bonded_contacts(spheres, 0.1)))
     with pytest.raises(GeometryError, match="overlap"):
         pipe_conductivity(medium_of(random_network.with_half_angle(np.radians(40.0))))
     with pytest.raises(ConvergenceError, match="do not balance"):

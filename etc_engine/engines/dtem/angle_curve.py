@@ -47,7 +47,7 @@ def solve_angle_curve(
     Parameters
     ----------
     medium : Medium
-        Two-dimensional, with a contact network whose own angles do not count.
+        With a contact network whose own angles do not count.
     axes : tuple of int
         A single walled axis, or periodic axes only.
     half_angles : sequence of float [rad]

@@ -1,4 +1,4 @@
-"""Resistances of disks with one flux mode per contact: the methods ``standard``, ``enhanced`` and ``chord``."""
+"""Resistances of particles with one flux mode per contact: the methods ``standard``, ``enhanced`` and ``chord``."""
 
 from __future__ import annotations
 
@@ -6,17 +6,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import DiskContacts, Resistances, disk_contacts, packed_starts
-from etc_engine.laws.disk import mutual_resistance_scalar, self_resistance
+from etc_engine.engines.dtem.element import Resistances, contact_potentials, packed_starts
+from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.sides import ContactSides
 
 
 def closed_form_resistances(
-    sides: ContactSides, conductivity: NDArray[np.float64], modes: int = 1, *, method: str
+    sides: ContactSides,
+    conductivity: NDArray[np.float64],
+    modes: int = 1,
+    *,
+    method: str,
+    cutting: NDArray[np.bool_] | None = None,
 ) -> Resistances:
-    """Resistance matrices H of all disks in closed form.
+    """Resistance matrices H of all disks or spheres in closed form.
 
-    H = (kappa h_ij)/kappa, plus each side's share of the contact resistance on the diagonal.
+    H = (kappa R^(d-2) h_ij)/(kappa R^(d-2)), plus each side's share of the contact resistance on the diagonal.
 
     Parameters
     ----------
@@ -25,7 +30,9 @@ def closed_form_resistances(
     modes : int
         Always 1.
     method : str
-        ``standard``, ``enhanced`` or ``chord``: what h_ii is.
+        ``standard`` or ``chord``, for disks also ``enhanced``: what h_ii is.
+    cutting : ndarray of bool, shape (s,), optional
+        Contacts behind which the particle ends, as in `etc_engine.laws.by_dimension.ResistanceLaw`.
 
     Returns
     -------
@@ -35,28 +42,33 @@ def closed_form_resistances(
     ----------
     Feng, Han, Li, Owen 2008, Eqs. 20 to 30, doi:10.1016/j.jcp.2008.01.031.
     """
-    disks = disk_contacts(sides, conductivity)
-    own = self_resistance(sides.alpha, method) / conductivity[sides.particles] + sides.resistances
-    starts = packed_starts(sides.offsets)
-    values = np.zeros(int(starts[-1]))
-    _fill(disks, own, starts, values)
-    directions = np.stack([np.cos(disks.theta), np.sin(disks.theta)], axis=1)
-    return Resistances(modes, starts, values, np.sinc(sides.alpha / np.pi)[:, None] * directions)
+    law, starts = law_of(sides.dimension), packed_starts(sides.offsets)
+    values = law.matrices(sides.offsets, sides.arms, sides.alpha, method, cutting)
+    scales = np.ascontiguousarray(conductivity * length_scales(sides.radii, sides.dimension))
+    _scale(sides.offsets, starts, scales, sides.resistances, values)
+    return Resistances(modes, starts, values, law.moments(sides.arms, sides.alpha))
+
+
+def closed_form_potentials(
+    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64], *, method: str
+) -> NDArray[np.float64]:
+    """Temperature of every contact above its particle's mean; only contacts with a flux of (s, 1) cut the particle."""
+    h = closed_form_resistances(sides, conductivity, method=method, cutting=flows[:, 0] != 0.0)
+    return contact_potentials(h, sides, flows)
 
 
 @njit(cache=True)
-def _fill(
-    disks: DiskContacts, own: NDArray[np.float64], starts: NDArray[np.int64], values: NDArray[np.float64]
+def _scale(
+    offsets: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    scales: NDArray[np.float64],
+    resistance: NDArray[np.float64],
+    values: NDArray[np.float64],
 ) -> None:
-    """h_ij = (kappa h_ij)(theta_i - theta_j, alpha_i, alpha_j)/kappa, symmetric; ``own`` is the diagonal."""
-    for p in range(disks.offsets.size - 1):
-        first, n = disks.offsets[p], disks.offsets[p + 1] - disks.offsets[p]
-        h = values[starts[p] : starts[p + 1]].reshape((n, n))
+    """H_ij = values_ij/scale + delta_ij R_i, in place."""
+    for p in range(offsets.size - 1):
+        n = offsets[p + 1] - offsets[p]
+        for k in range(starts[p], starts[p + 1]):
+            values[k] /= scales[p]
         for i in range(n):
-            a = first + i
-            h[i, i] = own[a]
-            for j in range(i):
-                b = first + j
-                separation = disks.theta[a] - disks.theta[b]
-                h[i, j] = mutual_resistance_scalar(separation, disks.alpha[a], disks.alpha[b]) / disks.conductivity[p]
-                h[j, i] = h[i, j]
+            values[starts[p] + i * n + i] += resistance[offsets[p] + i]

@@ -73,7 +73,7 @@ def element_conductivity(
         return solve_steady(medium, group, method=method, tolerance=tolerance, modes=modes, backbone=backbones[group])
 
     result = effective_tensor(medium.box, axes, solve)
-    if method == "chord":
+    if method == "chord" and medium.dimension == 2:
         estimates = [chord_error_estimate(s, load) for s in result.solutions for load in range(len(s.axes))]
         return replace(result, model_error=max(estimates))
     if method != "exact":

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem import arc
 from etc_engine.engines.dtem.arc import arc_resistances
-from etc_engine.engines.dtem.closed_form import closed_form_resistances
+from etc_engine.engines.dtem.closed_form import closed_form_potentials, closed_form_resistances
 from etc_engine.engines.dtem.element import Elements, Resistances, condensed_elements, contact_potentials
 from etc_engine.engines.dtem.exact import element as exact
 from etc_engine.engines.dtem.exact.element import exact_elements, exact_potentials
 from etc_engine.errors import InputError
-from etc_engine.laws.disk import SELF_RESISTANCE
+from etc_engine.laws.by_dimension import LAWS
 from etc_engine.medium.sides import ContactSides
 
 MakeResistances = Callable[[ContactSides, NDArray[np.float64], int], Resistances]
@@ -41,6 +41,8 @@ class Variant:
         Whether the disks lose what contacts and walls cut off: insulated walls and dead ends count then.
     resistances : callable, optional
         (sides, conductivity, modes) -> Resistances, which a transient needs; None where there is no such form.
+    dimensions : tuple of int
+        2 for disks, 3 for spheres.
     """
 
     elements: Callable[[ContactSides, NDArray[np.float64], int], Elements]
@@ -49,49 +51,65 @@ class Variant:
     uniform_flux: bool
     exact_cuts: bool = False
     resistances: MakeResistances | None = None
+    dimensions: tuple[int, ...] = (2,)
 
 
-def from_resistances(make: MakeResistances, modes: int, *, uniform_flux: bool) -> Variant:
-    """The variant whose elements and contact temperatures follow from its resistance matrices."""
+def _elements_of(make: MakeResistances, sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
+    """Elements that follow from resistance matrices."""
+    return condensed_elements(make(sides, conductivity, modes), sides)
 
-    def elements(sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
-        return condensed_elements(make(sides, conductivity, modes), sides)
 
-    def potentials(
-        sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        return contact_potentials(make(sides, conductivity, flows.shape[1]), sides, flows)
+def _arc_potentials(
+    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return contact_potentials(arc_resistances(sides, conductivity, flows.shape[1]), sides, flows)
 
-    return Variant(elements, potentials, modes, uniform_flux, resistances=make)
+
+def _closed_form(name: str) -> Variant:
+    """A variant in closed form, for the dimensions whose law has it."""
+    make = partial(closed_form_resistances, method=name)
+    return Variant(
+        partial(_elements_of, make),
+        partial(closed_form_potentials, method=name),
+        modes=1,
+        uniform_flux=name != "chord",
+        resistances=make,
+        dimensions=tuple(d for d, law in LAWS.items() if name in law.self_resistances),
+    )
 
 
 MOST_MODES = 10
 """Beyond these the matrices of an element lose their last digits."""
 
 METHODS: Mapping[str, Variant] = {
-    **{
-        name: from_resistances(partial(closed_form_resistances, method=name), 1, uniform_flux=name != "chord")
-        for name in SELF_RESISTANCE
-    },
-    "arc": from_resistances(arc_resistances, arc.MODES, uniform_flux=False),
+    **{name: _closed_form(name) for name in LAWS[2].self_resistances},
+    "arc": Variant(
+        partial(_elements_of, arc_resistances),
+        _arc_potentials,
+        arc.MODES,
+        uniform_flux=False,
+        resistances=arc_resistances,
+    ),
     "exact": Variant(exact_elements, exact_potentials, exact.MODES, uniform_flux=False, exact_cuts=True),
 }
 
 
-def find_method(name: str) -> Variant:
-    """The variant of that name.
+def find_method(name: str, dimension: int = 2) -> Variant:
+    """The variant of that name for disks (2) or spheres (3).
 
     Raises
     ------
     InputError
         If there is none.
     """
-    if name not in METHODS:
-        raise InputError(f"unknown method {name!r}: expected one of {', '.join(METHODS)}")
+    known = [word for word, variant in METHODS.items() if dimension in variant.dimensions]
+    if name not in known:
+        particles = "" if dimension == 2 else f" of a {LAWS[dimension].name}"
+        raise InputError(f"unknown method {name!r}{particles}: expected one of {', '.join(known)}")
     return METHODS[name]
 
 
-def flux_modes(name: str, modes: int | None) -> int:
+def flux_modes(name: str, modes: int | None, dimension: int = 2) -> int:
     """Flux modes of a contact: those asked for, or the method's own.
 
     Raises
@@ -99,11 +117,11 @@ def flux_modes(name: str, modes: int | None) -> int:
     InputError
         If the method does not have them.
     """
-    own = find_method(name).modes
+    own = find_method(name, dimension).modes
     if modes is None or modes == own:
         return own
     if own == 1:
-        raise InputError(f"method {name} has one flux mode a contact, found modes = {modes}: leave it out")
+        raise InputError(f"method {name} has one flux mode per contact, found modes = {modes}: leave it out")
     if not 1 <= modes <= MOST_MODES:
         raise InputError(f"the number of flux modes must lie between 1 and {MOST_MODES}, found {modes}")
     return modes

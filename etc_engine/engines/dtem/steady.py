@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.assembly import assemble, count_positive_off_diagonals
 from etc_engine.engines.dtem.methods import Variant, find_method, flux_modes
-from etc_engine.errors import InputError
 from etc_engine.medium.backbone import Backbone, find_backbone, restore_dead_ends
 from etc_engine.medium.loads import contact_lift, driven_walls
 from etc_engine.medium.medium import Medium, check_conductors
@@ -117,10 +116,8 @@ def element_geometry(
 ) -> ElementGeometry:
     """Backbone, contact sides and loads of one load group; arguments as in `solve_steady`."""
     network = medium.links
-    if medium.dimension != 2:
-        raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
     check_conductors(medium)
-    variant, modes = find_method(method), flux_modes(method, modes)
+    variant, modes = find_method(method, medium.dimension), flux_modes(method, modes, medium.dimension)
     backbone = find_backbone(network, axes) if backbone is None else backbone
     driven, cuts = driven_walls(network, axes), NO_CUTS
     if variant.exact_cuts:
@@ -152,7 +149,7 @@ def solve_steady(
     Parameters
     ----------
     medium : Medium
-        Two-dimensional, with a contact network.
+        Of disks or spheres, with a contact network.
     axes : tuple of int
         A single walled axis, or periodic axes only.
     method : str

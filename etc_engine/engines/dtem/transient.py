@@ -1,6 +1,6 @@
 """Heat conduction in time through a contact network: the discrete thermal element method with storage.
 
-Contacts are nodes without capacity, particles store heat at their mean temperature (or in three thirds, which adds
+Contacts are nodes without capacity, particles store heat at their mean temperature (or in d + 1 parts, which adds
 their dipoles; see `etc_engine.engines.dtem.storage`):
 
     C dT/dt = f(t) - K T,     K = sum over the particles of their storing elements,
@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.storage import FROM_THIRDS, storing_elements
-from etc_engine.errors import InputError
+from etc_engine.engines.dtem.storage import readings_of_parts, storing_elements
 from etc_engine.medium.medium import Medium, check_conductors
 from etc_engine.medium.sides import check_arcs, contact_sides
 from etc_engine.medium.transient import ParticleSystem, Source, joined_walls, particle_capacities, state_source
@@ -41,7 +40,7 @@ def element_system(
     Parameters
     ----------
     medium : Medium
-        Two-dimensional, with contacts and heat capacities. Rattlers and dead ends take part: they keep or take up heat.
+        With contacts and heat capacities. Rattlers and dead ends take part: they keep or take up heat.
     walls : mapping of str to condition
         By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
     method : str
@@ -50,15 +49,15 @@ def element_system(
         Whether the particles have dipole states, for earlier times.
     modes : int, optional
         Flux modes of a contact, with ``arc``.
-    source : float, array_like, shape (n,), or callable of t [W/m]
-        Heat set free evenly in all particles, or in each, per unit thickness.
+    source : float, array_like, shape (n,), or callable of t [W, in 2D W/m]
+        Heat set free evenly in all particles, or in each.
     capacities : ndarray, shape (n,), optional [J/(m K)]
         Of the particles; rho c times what their contacts leave of them by default.
 
     Returns
     -------
     ParticleSystem
-        With 3 states per particle with dipoles, otherwise 1.
+        With d + 1 states per particle with dipoles, otherwise 1.
 
     Raises
     ------
@@ -92,10 +91,8 @@ def element_system(
     >>> system.particle_temperatures(late.temperatures).round(6)
     array([1.])
     """
-    if medium.dimension != 2:
-        raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
     check_conductors(medium)
-    network, n, states = medium.links, medium.packing.count, 3 if dipoles else 1
+    network, n, states = medium.links, medium.packing.count, medium.dimension + 1 if dipoles else 1
     conditions = wall_conditions(medium.box, walls)
     kept = joined_walls(network.walls, conditions)
     reduced = network.select(np.ones(network.count, dtype=np.bool_), kept)
@@ -121,11 +118,11 @@ def element_system(
 
 
 def dipole_amplitudes(system: ParticleSystem, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Amplitudes D_c, D_s of each particle's linear part, shape (n, 2) [K]; zero where there are no such states."""
-    states = system.state_temperatures(unknowns)
+    """Amplitudes D of each particle's linear part, shape (n, d) [K]; zero where there are no such states."""
+    states, dimension = system.state_temperatures(unknowns), system.medium.dimension
     if system.states == 1:
-        return np.zeros((states.shape[0], 2))
-    return np.asarray(states @ FROM_THIRDS[1:].T)
+        return np.zeros((states.shape[0], dimension))
+    return np.asarray(states @ readings_of_parts(dimension)[1:].T)
 
 
 def contact_temperatures(system: ParticleSystem, time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:

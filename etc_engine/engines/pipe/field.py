@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from etc_engine.engines.pipe.steady import find_law
-from etc_engine.laws.shapes import self_resistance
+from etc_engine.laws.by_dimension import self_resistance
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.links import LinkSolution
 from etc_engine.medium.loads import driven_walls, wall_temperatures
@@ -37,8 +37,7 @@ def pipe_field(medium: Medium, method: str, solution: LinkSolution, load: int = 
     flows, wall_flows = solution.flows[:, load], solution.wall_flows[:, load]
     into[sides.of_contacts] = np.stack([-flows, flows], axis=1)
     into[sides.of_walls] = -wall_flows
-    radii = medium.packing.radii[sides.particles]
-    own = self_resistance(sides.alpha, radii, medium.dimension, find_law(method))
+    own = self_resistance(sides.alpha, sides.radii[sides.particles], medium.dimension, find_law(method))
     rises = own / kappa[sides.particles] * into
     temperatures = solution.temperatures[:, load]
     face = temperatures[network.pairs[:, 0]] + rises[sides.of_contacts[:, 0]]
