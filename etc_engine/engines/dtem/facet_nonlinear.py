@@ -124,10 +124,7 @@ def link_temperatures(links: FacetLinks, temperatures: Floats, axis: int, walls:
 def _balanced(
     solution: FacetSolution, temperatures: Floats, axis: int, walls: tuple[float, float], last: tuple[int, float]
 ) -> NonlinearSolution:
-    at_wall = solution.sides.nodes >= solution.sides.between
-    hot = at_wall & (solution.temperatures[:, 0] == 1.0)
-    enters = float(solution.heat_flows[hot, 0].sum())
-    leaves = -float(solution.heat_flows[at_wall & ~hot, 0].sum())
+    enters, leaves = solution.wall_heat()
     lengths = np.asarray(solution.links.packing.box.lengths)
     area = float(np.prod(lengths) / lengths[axis])
     drop = abs(walls[0] - walls[1])
