@@ -2,12 +2,9 @@
 
 from etc_engine.realization.engines import ENGINES, Engine, realize
 from etc_engine.realization.networks import conduct_dtem
-from etc_engine.realization.outcome import Cell, Cells, Realization, Status
+from etc_engine.realization.outcome import Cell, Realization, Status
 from etc_engine.realization.specification import (
-    CompositeSpec,
     ConductionSpec,
-    ContactSpec,
-    Mixture,
     RealizationSpec,
     particle_conductivities,
 )
@@ -15,12 +12,8 @@ from etc_engine.realization.specification import (
 __all__ = [
     "ENGINES",
     "Cell",
-    "Cells",
-    "CompositeSpec",
     "ConductionSpec",
-    "ContactSpec",
     "Engine",
-    "Mixture",
     "Realization",
     "RealizationSpec",
     "Status",

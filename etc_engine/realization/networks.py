@@ -20,18 +20,14 @@ from etc_engine.engines.dtem.effective import (
 from etc_engine.engines.dtem.model_error import chord_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution
 from etc_engine.engines.pipe.steady import PipeSolution, pipe_conductivity
-from etc_engine.errors import EtcError, InputError
+from etc_engine.errors import EtcError
 from etc_engine.medium.backbone import Backbone, find_backbones
 from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.packing import ParticlePacking
-from etc_engine.realization.outcome import Cell, Cells, Status, attempted, uniform_cells
-from etc_engine.realization.specification import (
-    ContactSpec,
-    RealizationSpec,
-    particle_conductivities,
-)
+from etc_engine.realization.outcome import Cell, Cells, Status, attempted
+from etc_engine.realization.specification import RealizationSpec, particle_conductivities
 
 CURVE_ANGLES = 4
 """From this many half-angles on, solving them together saves time."""
@@ -45,6 +41,8 @@ class _Medium:
     networks: list[ContactNetwork]
     backbones: Mapping[tuple[int, ...], Backbone]
     kappa: NDArray[np.float64]
+    contact_resistance: float
+    angles: Any
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -52,7 +50,7 @@ class _Medium:
         conduction = self.spec.conduction
         return {
             "conductivity": self.kappa,
-            "contact_resistance": conduction.contact_resistance,
+            "contact_resistance": self.contact_resistance,
             "tolerance": conduction.tolerance,
             "backbones": self.backbones,
         }
@@ -73,27 +71,37 @@ def conduct_pipe(packing: ParticlePacking, spec: RealizationSpec, rng: np.random
 
 
 def _conduct(packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator, column: Column) -> Cells:
-    angles: tuple[float | None, ...] = spec.contacts.contact_angles or (None,)
-    try:
-        network = contact_network(packing, spec.contacts)
-        backbones = find_backbones(network)
-    except EtcError as error:
-        return uniform_cells(spec, Cell(Status.ERROR, str(error)))
-    kappa = particle_conductivities(packing.count, spec.conduction, rng)
-    networks = [network if angle is None else network.with_half_angle(angle) for angle in angles]
-    medium = _Medium(spec, networks, backbones, kappa)
-    return tuple(zip(*(column(medium, method) for method in spec.conduction.methods), strict=True))
+    order = rng.permutation(packing.count) if "mixture_fraction" in {*spec.axes, *spec.values} else None
+    cells = np.empty(spec.shape, dtype=object)
+    names = list(spec.axes)
+    for place, values in zip(np.ndindex(spec.shape[:-1]), spec.combinations(), strict=True):
+        if "contact_angle" in names and place[names.index("contact_angle")] > 0:
+            continue
+        angles = spec.axes.get("contact_angle", (values.get("contact_angle"),))
+        at = tuple(slice(None) if name == "contact_angle" else place[i] for i, name in enumerate(names))
+        try:
+            network = contact_network(packing, spec.rule, values)
+            backbones = find_backbones(network)
+        except EtcError as error:
+            cells[at] = Cell(Status.ERROR, str(error))
+            continue
+        kappa = particle_conductivities(packing.count, values, order)
+        networks = [network if angle is None else network.with_half_angle(angle) for angle in angles]
+        medium = _Medium(spec, networks, backbones, kappa, values["contact_resistance"], angles)
+        for m, method in enumerate(spec.conduction.methods):
+            found = column(medium, method)
+            for k, cell in enumerate(found):
+                cells[(*(k if isinstance(x, slice) else x for x in at), m)] = cell
+    return tuple(cells.ravel())
 
 
-def contact_network(packing: ParticlePacking, contacts: ContactSpec) -> ContactNetwork:
+def contact_network(packing: ParticlePacking, rule: str, values: Mapping[str, float]) -> ContactNetwork:
     """Contacts of a packing by the rule of a study; bonded ones with the first of the half-angles."""
-    if contacts.rule == "overlap":
+    if rule == "overlap":
         return overlap_contacts(packing)
-    if contacts.rule == "bonded":
-        return bonded_contacts(packing, contacts.contact_angles[0], contacts.bond_gap)
-    if contacts.rule == "coordination":
-        return coordination_contacts(packing, contacts.contact_angles[0], contacts.coordination or np.nan)
-    raise InputError(f"unknown contact rule {contacts.rule!r}: expected overlap, bonded or coordination")
+    if rule == "bonded":
+        return bonded_contacts(packing, values["contact_angle"], values["bond_gap"])
+    return coordination_contacts(packing, values["contact_angle"], values["coordination"])
 
 
 def _dtem_column(medium: _Medium, method: str) -> list[Cell]:
@@ -101,10 +109,10 @@ def _dtem_column(medium: _Medium, method: str) -> list[Cell]:
 
     ``exact`` wants every solution, for its bounds.
     """
-    contacts, conduction = medium.spec.contacts, medium.spec.conduction
+    conduction = medium.spec.conduction
     points: Sequence[CurvePoint | None] = [None] * len(medium.networks)
-    if len(contacts.contact_angles) >= CURVE_ANGLES and conduction.angle_curve == "reduced" and method != "exact":
-        points = conductivity_curve(medium.networks[0], contacts.contact_angles, method=method, **medium.arguments)
+    if len(medium.angles) >= CURVE_ANGLES and conduction.angle_curve == "reduced" and method != "exact":
+        points = conductivity_curve(medium.networks[0], medium.angles, method=method, **medium.arguments)
     return [
         attempted(partial(_dtem_cell, medium, network, method))
         if point is None
@@ -152,7 +160,7 @@ def _solved_cell(
 ) -> Cell:
     missing = result.missing_axes
     mean_field = mean_field_conductivity(
-        network, conductivity=medium.kappa, contact_resistance=medium.spec.conduction.contact_resistance
+        network, conductivity=medium.kappa, contact_resistance=medium.contact_resistance
     )
     return Cell(
         status=Status.NOT_PERCOLATING if missing else Status.OK,

@@ -1,7 +1,8 @@
-"""What a realization leaves behind: a cell for every contact angle (or contrast) and method."""
+"""What a realization leaves behind: one cell per medium and method."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -54,18 +55,18 @@ class Cell:
     conductivity_bounds: tuple[tuple[float, float], ...] = ()
 
 
-Cells = tuple[tuple[Cell, ...], ...]
+Cells = tuple[Cell, ...]
 
 
 @dataclass(frozen=True)
 class Realization:
-    """What one realization gave; ``cells[variant][method]`` in the order of the specification."""
+    """What one realization gave; ``cells`` in the order of the specification, methods running fastest."""
 
     particles: int
     density: float
     solid_fraction: float
     pack_seconds: float
-    cells: Cells
+    cells: tuple[Cell, ...]
 
 
 def attempted(solve: Callable[[], Cell], dimension: int = 2) -> Cell:
@@ -83,4 +84,4 @@ def attempted(solve: Callable[[], Cell], dimension: int = 2) -> Cell:
 
 def uniform_cells(spec: RealizationSpec, cell: Cell) -> Cells:
     """The same outcome in every cell of a realization."""
-    return ((cell,) * len(spec.conduction.methods),) * spec.variants
+    return (cell,) * math.prod(spec.shape)
