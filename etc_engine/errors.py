@@ -1,4 +1,7 @@
-"""The errors of the engine: each says what was found, what was expected and what to do."""
+"""The errors of the engine: each says what was found, what was expected and what to do.
+
+Each is also the Python error that a caller would expect.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ class EtcError(Exception):
     """Base of every error the engine raises on purpose; the command line prints it as one line."""
 
 
-class InputError(EtcError):
+class InputError(EtcError, ValueError):
     """The user's input (a file, an option, a study) is not what the engine can work with."""
 
 
@@ -17,7 +20,7 @@ class GeometryError(InputError):
     """Particles or contacts do not form a geometry the model describes."""
 
 
-class PackingError(EtcError):
+class PackingError(EtcError, RuntimeError):
     """A packing algorithm could not reach its target.
 
     Parameters
@@ -33,7 +36,7 @@ class PackingError(EtcError):
         self.reached = reached
 
 
-class ConvergenceError(EtcError):
+class ConvergenceError(EtcError, RuntimeError):
     """An iterative solver stopped before its tolerance.
 
     Parameters
@@ -53,5 +56,5 @@ class StudyError(InputError):
     """A study file is not valid, or does not belong to the result it is used with."""
 
 
-class OutputError(EtcError):
-    """A result cannot be written where it was asked for."""
+class OutputError(EtcError, OSError):
+    """A file cannot be written where it was asked for, or a result cannot be read."""

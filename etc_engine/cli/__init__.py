@@ -28,6 +28,8 @@ COMMANDS = {
     "info": "etc_engine.cli.info:info_command",
     "rerun": "etc_engine.cli.rerun:rerun_command",
     "models": "etc_engine.cli.models:models_command",
+    "export": "etc_engine.cli.export:export_command",
+    "materials": "etc_engine.cli.materials:materials_command",
     "transient": "etc_engine.cli.transient:transient_command",
     "serve": "etc_engine.cli.serve:serve_command",
     "submit": "etc_engine.cli.submit:submit_command",

@@ -29,8 +29,9 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     over the density. Exit status 3 if a rigorous bound is broken, which is possible for overlapping particles and for
     whole cells with pores that conduct only.
     """
-    from etc_engine.cli.options import check_picture, check_place, print_json, replacing
+    from etc_engine.cli.options import check_picture, check_place, print_json
     from etc_engine.comparison import evaluate_models, fit_models, model_lines
+    from etc_engine.durable.files import replacing
     from etc_engine.errors import InputError
     from etc_engine.sweep.dataset import open_dataset
 

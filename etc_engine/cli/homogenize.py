@@ -211,7 +211,7 @@ def _write(
     if path is None:
         return
     from etc_engine.box import AXES
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
     from etc_engine.durable.provenance import engine_version
     from etc_engine.particle_files.netcdf import packing_dataset
 
@@ -237,7 +237,7 @@ def _draw(
     files: ExitStack, path: Path, composite: Composite, boundary: str, record: dict[str, Any], options: dict[str, Any]
 ) -> None:
     """A section, from one more solve that keeps the field."""
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
     from etc_engine.engines.voxel.section import solve_section
     from etc_engine.output.figures.voxel import save_section
 

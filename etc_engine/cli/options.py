@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,6 +11,7 @@ from typing import Any
 import click
 
 from etc_engine.box import Box, parse_periodic
+from etc_engine.durable.files import replacing
 from etc_engine.errors import InputError, OutputError
 
 
@@ -72,37 +69,3 @@ def check_place(path: Path, *inputs: Path) -> None:
             raise OutputError(f"the output {path} is the input itself: it would be lost, choose another name")
     with replacing(path, keep=False):
         pass
-
-
-@contextmanager
-def replacing(path: Path | str, *, keep: bool = True) -> Iterator[Path]:
-    """A temporary neighbour of a file that takes its place when the block ends well, and vanishes otherwise.
-
-    With ``keep=False`` it vanishes in any case: a trial.
-
-    Raises
-    ------
-    OutputError
-        If the place cannot be written to.
-    """
-    path = Path(path)
-    if path.is_dir():
-        raise OutputError(f"cannot write {path}: it is a directory")
-    try:
-        handle, name = tempfile.mkstemp(dir=path.parent or Path(), prefix=f".{path.name}.", suffix=path.suffix)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        if not keep:
-            return
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)

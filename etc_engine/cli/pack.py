@@ -60,8 +60,9 @@ def pack_command(
     """Make a random packing and write it to a file, in the format of its ending."""
     from numpy.random import SeedSequence, default_rng
 
-    from etc_engine.cli.options import check_picture, check_place, parse_box, print_json, replacing
+    from etc_engine.cli.options import check_picture, check_place, parse_box, print_json
     from etc_engine.cli.progress import PackingProgress
+    from etc_engine.durable.files import replacing
     from etc_engine.errors import InputError
     from etc_engine.packing import PackingSpec, pack
     from etc_engine.packing.neighbors import neighbor_pairs

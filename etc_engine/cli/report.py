@@ -19,7 +19,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     Figures, statistics, models, convergence, failures and provenance. Further results of the same study in boxes of
     other sizes show the convergence with system size. Exit status 3 if a rigorous bound is broken.
     """
-    from etc_engine.cli.options import check_picture, check_place, replacing
+    from etc_engine.cli.options import check_picture, check_place
     from etc_engine.comparison import (
         evaluate_models,
         fit_models,
@@ -28,6 +28,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
         samples,
         system_sizes,
     )
+    from etc_engine.durable.files import replacing
     from etc_engine.output.report import report_page
     from etc_engine.sweep.dataset import open_dataset
 

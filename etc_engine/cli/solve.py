@@ -208,7 +208,7 @@ def _write(
     record: dict[str, Any],
 ) -> None:
     """Write what was asked for: every file whole, or none of them."""
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
 
     solution = result.solutions[0]
     with ExitStack() as files:

@@ -54,7 +54,8 @@ def transient_command(
 
 
 def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import check_place, replacing
+    from etc_engine.cli.options import check_place
+    from etc_engine.durable.files import replacing
     from etc_engine.study.meshless import run_study
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
@@ -69,8 +70,8 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
 
 
 def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import replacing
     from etc_engine.cli.progress import PackingProgress
+    from etc_engine.durable.files import replacing
     from etc_engine.output.series import series_dataset
     from etc_engine.study.transient import parse_study
     from etc_engine.transient.run import run_transient
@@ -153,7 +154,7 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
 
 def _draw(series: xarray.Dataset, wanted: Wanted) -> str:
     """Write the picture and the VTK series that are asked for; what was written, in words."""
-    from etc_engine.cli.options import replacing
+    from etc_engine.durable.files import replacing
     from etc_engine.output.series import write_vtk_series
 
     if wanted.plot is not None:

@@ -3,8 +3,11 @@
 The lock is a small file with the holder's host, process and batch job, touched every few seconds. It is
 stale when its process is gone (same host), when its batch job was requeued and this is the requeued job,
 or when it has not been touched for `SILENCE` seconds (another host). Times are compared on the clock of
-the file system, so clocks of hosts may differ. A small shell does the touching: a compiled kernel can keep
-a thread of this process waiting for minutes.
+the file system, so clocks of hosts may differ.
+
+A small process of its own does the touching. A thread cannot: a compiled kernel holds the interpreter for minutes, and
+the lock would look stale. The process waits on a pipe that only this one holds open, so that it ends together with
+the run, however the run ends.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ import json
 import os
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -23,8 +27,19 @@ from etc_engine.errors import OutputError
 
 BEAT = 10.0
 SILENCE = 120.0
-HEART = 'while kill -0 "$3" && grep -q "$2" "$1"; do touch -c "$1"; sleep "$4"; done 2>/dev/null'
-"""Touches a lock as long as the process lives and the lock is its run's: path, run, process, seconds."""
+HEART = """
+import os, select, sys
+path, run, seconds = sys.argv[1], sys.argv[2], float(sys.argv[3])
+while not select.select([0], [], [], seconds)[0]:
+    try:
+        with open(path) as lock:
+            if run not in lock.read():
+                break
+        os.utime(path)
+    except OSError:
+        break
+"""
+"""Touches a lock while its run holds it, until standard input ends: path, run, seconds."""
 
 
 @dataclass(frozen=True)
@@ -81,16 +96,17 @@ class Lock:
             if reason:
                 raise OutputError(f"another run is computing this output ({reason}): wait for it, or end it first")
             self._remove_stale()
-        command = ["sh", "-c", HEART, "heart", str(self.path), self.holder.run, str(os.getpid()), str(BEAT)]
-        quiet = subprocess.DEVNULL  # an open pipe would keep the launcher waiting
-        self._heart = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+        command = [sys.executable, "-I", "-S", "-c", HEART, str(self.path), self.holder.run, str(BEAT)]
+        quiet = subprocess.DEVNULL  # an inherited output would keep a launcher waiting
+        self._heart = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._heart is not None:
-            self._heart.terminate()
+            assert self._heart.stdin is not None
+            self._heart.stdin.close()
             self._heart.wait()
         if held_by(self.path, self.holder.run):
             self.path.unlink(missing_ok=True)

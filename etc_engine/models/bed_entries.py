@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from etc_engine.models import granular, networks
+from etc_engine.models import granular, heated_beds, networks
 from etc_engine.models.model import (
     ANY_CONDUCTIVITY,
     FROM_ZERO,
@@ -25,6 +25,11 @@ BED = (FLUID, SOLID, SOLID_FRACTION)
 SPACING = Input("spacing", "centre distance over particle diameter (beta)", "-", POSITIVE)
 SHAPE = Input("shape_factor", "C: 1.25 spheres, 1.4 broken particles, 2.5 cylinders", "-", POSITIVE)
 
+DIAMETER = Input("diameter", "particle diameter", "m", POSITIVE)
+TEMPERATURE = Input("temperature", "absolute temperature", "K", POSITIVE)
+EMISSIVITY = Input("emissivity", "emissivity of the particles", "-", UNIT)
+EMITTING = Input("emissivity", "emissivity of the particles", "-", Interval(0.0, 1.0, "high"))
+POROUS = Input("fraction", "solid fraction", "-", Interval(0.0, 1.0, "none"))
 
 GRANULAR = (
     Model(
@@ -123,6 +128,82 @@ GRANULAR = (
         "random beds of touching spheres, solid fraction near 0.63, k2/k1 from about 1000, none below e^3",
         "grows as 4 ln(k2/k1)",
         "Batchelor and O'Brien, Proc. R. Soc. Lond. A 355, 313 (1977), 10.1098/rspa.1977.0100",
+    ),
+    Model(
+        "zehner_bauer_schluender",
+        "Zehner-Bauer-Schlünder (ZBS) with contact, rarefied gas and radiation",
+        heated_beds.zehner_bauer_schluender,
+        (3,),
+        "estimate",
+        (
+            FLUID,
+            SOLID,
+            Input("fraction", "solid fraction", "-", Interval(0.0, 1.0, "low")),
+            DIAMETER,
+            TEMPERATURE,
+            EMISSIVITY,
+            Input("jump_length", "temperature jump length of one surface; inf in vacuum", "m", ANY_CONDUCTIVITY),
+            Input("contact_fraction", "flattening coefficient (0.0077 ceramic spheres)", "-", UNIT),
+            SHAPE,
+        ),
+        "stagnant gas of any pressure, k2/k1 up to about 2000",
+        "ZBS with contact area without radiation in a continuum gas; Breitbach-Barthels in vacuum with emissivity 1",
+        "Bauer and Schlünder, Int. Chem. Eng. 18, 189 (1978); VDI Heat Atlas (2010), D6.3",
+    ),
+    Model(
+        "breitbach_barthels",
+        "Breitbach-Barthels (radiation alone)",
+        heated_beds.breitbach_barthels,
+        (3,),
+        "estimate",
+        (SOLID, POROUS, DIAMETER, TEMPERATURE, EMITTING),
+        "radiation of a pebble bed: gas and contacts are left out (k1 is not used)",
+        "grows as T^3 for a solid of high conductivity",
+        "Breitbach and Barthels, Nucl. Technol. 49, 392 (1980), 10.13182/NT80-A17687",
+    ),
+    Model(
+        "kunii_smith_radiation",
+        "Kunii-Smith with radiation",
+        heated_beds.kunii_smith_radiation,
+        (3,),
+        "estimate",
+        (FLUID, SOLID, POROUS, DIAMETER, TEMPERATURE, EMITTING, SPACING),
+        "porosity 0.26 to 0.476 (film thickness constant outside), continuum gas",
+        "Kunii-Smith at low temperature",
+        "Kunii and Smith, AIChE J. 6, 71 (1960), 10.1002/aic.690060115",
+    ),
+    Model(
+        "hsu_cubes",
+        "Hsu-Cheng-Wong, touching cubes",
+        heated_beds.hsu_cubes,
+        (3,),
+        "estimate",
+        (*BED, Input("contact_width", "width of the contact plates over that of the cubes", "-", UNIT)),
+        "packed beds with finite contact area",
+        "k1 and k2 for the pure phases, k1 for equal phases",
+        "Hsu, Cheng and Wong, J. Heat Transfer 117, 264 (1995), 10.1115/1.2822515",
+    ),
+    Model(
+        "hsu_square_cylinders",
+        "Hsu-Cheng-Wong, touching square cylinders",
+        heated_beds.hsu_square_cylinders,
+        (2,),
+        "estimate",
+        (*BED, Input("contact_width", "width of the contact plates over that of the cylinders", "-", UNIT)),
+        "packed beds with finite contact area",
+        "k1 and k2 for the pure phases, k1 for equal phases",
+        "Hsu, Cheng and Wong, J. Heat Transfer 117, 264 (1995), 10.1115/1.2822515",
+    ),
+    Model(
+        "hamilton_crosser",
+        "Hamilton-Crosser",
+        heated_beds.hamilton_crosser,
+        (3,),
+        "estimate",
+        (*BED, Input("sphericity", "psi: 1 for spheres", "-", Interval(0.0, 1.0, "high"))),
+        "dispersions of particles of any shape",
+        "Maxwell's formula for spheres (sphericity 1)",
+        "Hamilton and Crosser, Ind. Eng. Chem. Fundam. 1, 187 (1962), 10.1021/i160003a005",
     ),
 )
 

@@ -11,7 +11,7 @@ LOOSE, DENSE = 0.476, 0.26
 """Porosities of the simple cubic and the close packing, between which Kunii and Smith interpolate."""
 
 
-def _log_remainder(h: Floats) -> Floats:
+def log_remainder(h: Floats) -> Floats:
     """(-log(1 - h) - h - h^2/2) / h^3 = sum of h^n/(n + 3), finite at h = 0."""
     series = np.zeros_like(h)
     for n in range(39, -1, -1):  # 0.35^40 is below the rounding error
@@ -25,7 +25,7 @@ def _unit_cell(k1: Floats, k2: Floats, fraction: Floats, shape_factor: Floats | 
     b = shape_factor * (fraction / (1.0 - fraction)) ** (10.0 / 9.0)
     h = 1.0 - b * k1 / k2
     # The printed form has poles at k2 = b k1 (h = 0) that cancel; this one has none.
-    return 2.0 * (b * (1.0 - k1 / k2) * _log_remainder(h) + 0.5)
+    return 2.0 * (b * (1.0 - k1 / k2) * log_remainder(h) + 0.5)
 
 
 @elementwise
@@ -117,7 +117,7 @@ def zbs_contact(
     return with_pure_phases(k, k1, k2, fraction)
 
 
-def _fluid_film(k1: Floats, k2: Floats, contacts: float) -> Floats:
+def fluid_film(k1: Floats, k2: Floats, contacts: float) -> Floats:
     """Kunii and Smith's film thickness per diameter, for sin^2 theta = 1/contacts."""
     s2 = 1.0 / contacts
     s = s2 / (1.0 + np.sqrt(1.0 - s2))  # 1 - cos theta
@@ -171,7 +171,7 @@ def kunii_smith(k1: Floats, k2: Floats, fraction: Floats, spacing: Floats | floa
     8.345371
     """
     porosity = 1.0 - fraction
-    loose, dense = _fluid_film(k1, k2, 1.5), _fluid_film(k1, k2, 4.0 * np.sqrt(3.0))
+    loose, dense = fluid_film(k1, k2, 1.5), fluid_film(k1, k2, 4.0 * np.sqrt(3.0))
     share = np.clip((porosity - DENSE) / (LOOSE - DENSE), 0.0, 1.0)
     film = dense + (loose - dense) * share
     return k1 * (porosity + spacing * fraction / (film + 2.0 / 3.0 * k1 / k2))

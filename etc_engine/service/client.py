@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import tempfile
 import time
@@ -21,12 +20,12 @@ import urllib.error
 import urllib.parse
 import urllib.request
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from http.client import HTTPException
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+from etc_engine.durable.files import replacing
 from etc_engine.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -155,22 +154,16 @@ def fetch(server: Server, study: str, output: Path | None = None) -> xarray.Data
 
 def download(server: Server, study: str, output: Path, part: str = "result.nc") -> None:
     """Write the result (or ``report.html``) of a study to a file, whole or not at all."""
-    draft = output.with_name(f".{output.name}.{os.getpid()}.tmp")
-    try:
-        with _open(server, "GET", f"/api/studies/{_identity(study)}/{part}") as answer:
-            expected = int(answer.headers.get("content-length", -1))  # type: ignore[attr-defined]
-            with draft.open("wb") as file:
-                while block := answer.read(CHUNK):
-                    file.write(block)
-                length = file.tell()
-        if expected not in (-1, length):
-            raise OutputError(f"{server.url} broke off after {length} of {expected} bytes: try again")
-        draft.replace(output)
-    except OSError as error:
-        raise OutputError(f"cannot write {output}: {error.strerror or error}") from None
-    finally:
-        with suppress(OSError):
-            draft.unlink(missing_ok=True)
+    with (
+        replacing(output) as draft,
+        _open(server, "GET", f"/api/studies/{_identity(study)}/{part}") as reply,
+        draft.open("wb") as file,
+    ):
+        expected = int(reply.headers.get("content-length", -1))  # type: ignore[attr-defined]
+        while block := reply.read(CHUNK):
+            file.write(block)
+        if expected not in (-1, file.tell()):
+            raise OutputError(f"{server.url} broke off after {file.tell()} of {expected} bytes: try again")
 
 
 def solve(server: Server, particles: bytes, **options: Any) -> dict[str, Any]:

@@ -86,8 +86,6 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
     else:
         clear_folder(folder)
         write_study_file(folder, study.identity(), study.digest())
-    for leftover in output.parent.glob(f".{output.name}.*.tmp"):  # of a run killed while it wrote the output
-        leftover.unlink(missing_ok=True)
     record = json.dumps(asdict(this_run(run, ranks, lock.holder.job)))
     write_atomically(folder / f"{run}.run", record.encode())
     return Claim(study, text, output, run, remarks=remarks)

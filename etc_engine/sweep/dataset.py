@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.durable.files import sync_folder
+from etc_engine.durable.files import replacing
 from etc_engine.errors import OutputError
 from etc_engine.realization import Status
 from etc_engine.study.quantities import QUANTITIES
@@ -175,22 +174,17 @@ def _status_attributes() -> dict[str, Any]:
 
 
 def write_dataset(dataset: xarray.Dataset, output: Path) -> None:
-    """Write a dataset as netCDF-4: temporary file, sync, rename.
+    """Write a dataset as netCDF-4, whole or not at all.
 
     Raises
     ------
     OutputError
         If it cannot be written; nothing is left behind then.
     """
-    temporary = output.with_name(f".{output.name}.{os.getpid()}.tmp")
     try:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
-        with temporary.open("rb") as stream:
-            os.fsync(stream.fileno())
-        temporary.replace(output)
-        sync_folder(output.parent)
+        with replacing(output) as temporary:
+            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
     except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as RuntimeError
-        temporary.unlink(missing_ok=True)
         raise OutputError(f"cannot write {output}: {error}; the finished units are safe in its shards") from None
 
 

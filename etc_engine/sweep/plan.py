@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.realization import Status
-from etc_engine.sweep.statistics import half_width
+from etc_engine.sweep.statistics import interval
 
 if TYPE_CHECKING:
     from etc_engine.study.sweep import Study
@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 GROWTH_LIMIT = 4
 """A round of an adaptive sweep multiplies the realizations of a density by at most this: the first
 estimates of the spread are poor, and one of them must not order thousands of units."""
+
+LEAST = 6
+"""An adaptive sweep settles no cell with fewer realizations: intervals at the 95 % level would cover in 90 %."""
+
+LEAST_OF_ZEROS = 20
+"""... nor one in which nothing percolates: then fewer than one realization in five percolates, at the 95 % level."""
 
 
 @dataclass(frozen=True)
@@ -120,9 +126,12 @@ def needed_realizations(
 
     Notes
     -----
-    The target is the n that the present spread asks for, at least one more and at most `GROWTH_LIMIT`
-    times the present number. A cell without any valid result is left alone: more failures teach nothing.
-    Stopping on the sample's own spread makes the interval slightly optimistic (sequential sampling).
+    The target is the n that the present interval asks for, at least one more and at most `GROWTH_LIMIT` times the
+    present number. Stopping on the sample's own spread makes the interval optimistic (sequential sampling), so that
+    nothing is settled before `LEAST` realizations. Once a realization did not percolate, the interval of
+    `etc_engine.sweep.statistics.interval` carries the uncertainty of the percolating fraction, and a stretch of
+    realizations that all percolate cannot end the cell early. A cell without any valid result is left alone,
+    and one in which nothing percolates after `LEAST_OF_ZEROS`: more of the same teach little.
 
     Examples
     --------
@@ -134,13 +143,16 @@ def needed_realizations(
         return realized
     if n == 1:
         return min(cap, 2 * realized)
-    mean, width = float(np.mean(samples)), half_width(np.asarray(samples), confidence)
-    if width <= relative_ci * abs(mean):
-        return realized
-    if mean == 0.0:
+    least = min(cap, LEAST, GROWTH_LIMIT * realized)
+    found = interval(np.asarray(samples), confidence)
+    if found.percolating_fraction == 0.0:
+        return max(realized, min(cap, LEAST_OF_ZEROS, GROWTH_LIMIT * realized))
+    if found.half_width <= relative_ci * found.mean:
+        return max(realized, least)
+    if not np.isfinite(found.half_width):
         return min(cap, GROWTH_LIMIT * realized)
-    wanted = np.ceil(realized * (width / (relative_ci * mean)) ** 2)
-    return int(min(cap, max(realized + 1, min(wanted, GROWTH_LIMIT * realized))))
+    wanted = np.ceil(realized * (found.half_width / (relative_ci * found.mean)) ** 2)
+    return int(min(cap, max(realized + 1, least, min(wanted, GROWTH_LIMIT * realized))))
 
 
 def next_targets(study: Study, targets: Sequence[int], table: Table) -> tuple[int, ...]:

@@ -52,7 +52,7 @@ def write_state(folder: Path, index: int, state: State) -> None:
         write_atomically(path, buffer.getvalue())
     except OSError as error:
         raise OutputError(
-            f"cannot write {path}: {error.strerror}; earlier states stay, make room and go on with --resume"
+            f"cannot write {path}: {error.strerror or error}; make room and continue with --resume"
         ) from None
 
 

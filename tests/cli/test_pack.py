@@ -216,7 +216,7 @@ class Terminal(StringIO):
 
 
 def test_vtk_files_without_vtk_are_refused_before_the_work(pack, tmp_path, monkeypatch):
-    from etc_engine.packing import vtp
+    from etc_engine.particle_files import vtp
 
     monkeypatch.setattr(vtp, "find_spec", lambda _: None)
     done = pack(*SMALL, "-o", tmp_path / "a.vtp")

@@ -12,12 +12,16 @@ from hypothesis import strategies as st
 from etc_engine.models import CATALOGUE, evaluate
 
 INF = math.inf
+HOT = {"diameter": 1e-3, "temperature": 900.0, "emissivity": 0.8}
 BOX = {
     "hasselman_johnson": {"radius": 0.5, "interface_conductance": INF},
     "yagi_kunii": {"film_thickness": 0.05},
     "contact_mean_field": {"coordination": 4.0, "conductance_distance2": 1.5, "radius_moment": 1.0},
     "kirkpatrick": {"coordination": 5.0},
     "percolation_power_law": {"threshold": 0.4},
+    "zehner_bauer_schluender": HOT | {"jump_length": 1e-5},
+    "breitbach_barthels": HOT,
+    "kunii_smith_radiation": HOT,
 }
 CASES = [(name, d) for name, model in CATALOGUE.items() for d in model.dimensions]
 ARRAYS = ("square_array", "hexagonal_array", "simple_cubic", "bcc", "fcc")
@@ -50,6 +54,9 @@ EQUAL_PHASES = (
     "hadley",
     "agari_uno",
     "lewis_nielsen",
+    "hsu_cubes",
+    "hsu_square_cylinders",
+    "hamilton_crosser",
 )
 PURE_SOLID = (
     *MEDIA,
@@ -59,8 +66,22 @@ PURE_SOLID = (
     "hadley",
     "agari_uno",
     "percolation_power_law",
+    "hsu_cubes",
+    "hsu_square_cylinders",
+    "hamilton_crosser",
 )
-PURE_FLUID = (*MEDIA, *ARRAYS, "russell", "zehner_schluender", "zbs_contact", "kunii_smith", "lewis_nielsen")
+PURE_FLUID = (
+    *MEDIA,
+    *ARRAYS,
+    "russell",
+    "zehner_schluender",
+    "zbs_contact",
+    "kunii_smith",
+    "lewis_nielsen",
+    "hsu_cubes",
+    "hsu_square_cylinders",
+    "hamilton_crosser",
+)
 
 conductivities = st.floats(1e-3, 1e3)
 fractions = st.floats(0.0, 1.0)
@@ -187,6 +208,8 @@ def test_symmetric_under_exchange_of_phases(name, k1, k2, fraction, dimension):
 @quick
 def test_conductivities_scale(name, dimension, scale, fraction):
     parameters = {"conductance_distance2": 1.5 * scale} if name == "contact_mean_field" else {}
+    lengths = ("diameter", "jump_length")  # radiation and rarefied gas are per length: both scale with it
+    parameters |= {key: scale * value for key, value in BOX.get(name, {}).items() if key in lengths}
     k = conductivity(name, 0.3, 30.0, fraction, dimension)
     scaled = conductivity(name, 0.3 * scale, 30.0 * scale, fraction, dimension, **parameters)
     assert scaled == pytest.approx(scale * k, rel=1e-9)

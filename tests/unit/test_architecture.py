@@ -44,6 +44,7 @@ KEEPERS = {
     "matplotlib": {"output/figures"},
     "pyamg": {"solvers"},
     "click": {"cli"},
+    "CoolProp": {"materials/gases.py"},
     "fastapi": {"service"},
     "starlette": {"service"},
     "uvicorn": {"service/server.py"},

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from etc_engine.sweep.plan import (
     GROWTH_LIMIT,
+    LEAST,
     Unit,
     density_bits,
     needed_realizations,
@@ -70,15 +71,25 @@ def test_a_cell_is_settled_exactly_when_its_interval_is_narrow_enough(values, re
     n = len(values)
     target = needed_realizations(values, n, relative, 0.95, cap)
     settled = half_width(np.array(values), 0.95) <= relative * np.mean(values)
-    if settled or n >= cap:
+    if n >= cap or (settled and n >= LEAST):
         assert target == n
+    elif settled:
+        assert n < target <= LEAST
     else:
         assert n < target <= min(cap, GROWTH_LIMIT * n)
 
 
 @pytest.mark.parametrize(
     ("values", "realized", "target"),
-    [([], 5, 5), ([1.0], 5, 10), ([0.0, 0.0], 2, 2), ([-1.0, 1.0], 2, 8), ([1.0, 1.0], 2, 2)],
+    [
+        ([], 5, 5),
+        ([1.0], 5, 10),
+        ([0.0, 0.0], 2, 8),
+        ([0.0, 1.0], 2, 8),
+        ([1.0, 1.0], 2, 6),
+        ([1.0] * 6, 6, 6),
+        ([0.0] * 20, 20, 20),
+    ],
 )
 def test_cells_with_little_to_go_on(values, realized, target):
     assert needed_realizations(values, realized, 0.01, 0.95, 100) == target

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from etc_engine.box import Box
+from etc_engine.durable.files import write_atomically
 from etc_engine.errors import OutputError
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import Cell, ConductionSpec, ContactSpec, Realization, RealizationSpec, Status
@@ -18,7 +19,7 @@ from etc_engine.sweep import gathering
 from etc_engine.sweep.plan import Unit
 from etc_engine.sweep.records import Record, decode, encode, failed_realization
 from etc_engine.sweep.scheduler import Solo
-from etc_engine.sweep.shards import ShardReader, ShardWriter, frame, unframe, write_atomically
+from etc_engine.sweep.shards import ShardReader, ShardWriter, frame, unframe
 from etc_engine.sweep.table import join, tabulate
 
 

@@ -44,6 +44,12 @@ REQUIRED = {
     "contact_mean_field",
     "kirkpatrick",
     "percolation_power_law",
+    "zehner_bauer_schluender",
+    "breitbach_barthels",
+    "kunii_smith_radiation",
+    "hsu_cubes",
+    "hsu_square_cylinders",
+    "hamilton_crosser",
 }
 
 GOOD = {"k1": 1.0, "k2": 10.0, "fraction": 0.3, "dimension": 2}
