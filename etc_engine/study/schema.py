@@ -148,6 +148,8 @@ def _tagged(annotation: Any, tag: str) -> Any:
     for way in get_args(annotation):
         if any(isinstance(mark, Tag) and mark.tag == tag for mark in get_args(way)):
             return way
+        if (inner := _tagged(way, tag)) is not None:
+            return inner
     return None
 
 

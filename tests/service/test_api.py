@@ -44,7 +44,7 @@ def test_a_study_ends_in_the_bits_of_the_command(real, finished, tmp_path, etc_e
 
 def test_the_same_study_is_answered_from_the_result(real, finished):
     """Neither layout, order, comments nor JSON make it another study."""
-    other = '# mine\nname = "served"\nschema = 1\nseed = 271828\n' + STUDY[STUDY.index("[packing]") :]
+    other = '# mine\nname = "served"\nschema = 2\nseed = 271828\n' + STUDY[STUDY.index("[packing]") :]
     for same in (STUDY, other, tomllib.loads(STUDY)):
         again = client.submit(real.server, same)
         assert (again["id"], again["new"], again["state"]) == (finished["id"], False, "done")
@@ -70,7 +70,7 @@ def test_the_figure_has_the_numbers_of_the_result(real, finished):
     assert {"maxwell", "hashin_shtrikman_upper"} <= {model["name"] for model in curve["models"]}
 
 
-COMPOSITE = """schema = 1
+COMPOSITE = """schema = 2
 name = "composite"
 seed = 271828
 [packing]
@@ -245,7 +245,7 @@ def test_refused_json(service, body):
 @pytest.mark.parametrize(
     ("path", "body", "words"),
     [
-        ("/api/studies", b'{"schema": 1, "schema": 1}', "study: the key 'schema' is given twice"),
+        ("/api/studies", b'{"schema": 2, "schema": 2}', "study: the key 'schema' is given twice"),
         ("/api/studies", b'{"packing": {"count": 1, "count": 2}}', "study: the key 'count' is given twice"),
         ("/api/models/maxwell", b'{"k1": 1.0, "k1": 2.0}', "the key 'k1' is given twice"),
         ("/api/models/maxwell", b'{"k1": }', "the body is not valid JSON: Expecting value at character 7; expected"),

@@ -16,7 +16,7 @@ from etc_engine.study.sweep import Study, parse_study
 from etc_engine.sweep.dataset import open_dataset
 
 STUDY = """
-schema = 1
+schema = 2
 name = "composite"
 seed = 20263
 [packing]

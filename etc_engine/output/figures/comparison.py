@@ -163,7 +163,8 @@ def _panels(comparison: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.D
     found = []
     for values in itertools.product(*(comparison[dim].values for dim in axis.panels)):
         chosen = dict(zip(axis.panels, values, strict=True))
-        found.append((", ".join(word_of(dim, value) for dim, value in chosen.items()), comparison.sel(chosen)))
+        words = (f"method {value}" if dim == "method" else word_of(dim, value) for dim, value in chosen.items())
+        found.append((", ".join(words), comparison.sel(chosen)))
     return found
 
 
