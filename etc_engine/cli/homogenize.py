@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.particle_options import SampleWords, particle_options, read_sample
+
 if TYPE_CHECKING:
     from etc_engine.medium.composite import Composite, Homogenized
-    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.table import ParticleTable
 
 ENGINES = ("voxel", "lattice")
 
 
 @click.command("homogenize")
 @click.argument("inclusions", type=click.Path(path_type=Path))
-@click.option("--box", help="Edge lengths, such as 1,1,1; only for CSV.")
-@click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
+@particle_options
 @click.option("--engine", type=click.Choice(ENGINES), default="voxel", show_default=True, help="FFT, or particles.")
 @click.option("--matrix", type=float, required=True, help="Conductivity of the matrix [W/(m K)].")
 @click.option(
@@ -48,8 +49,7 @@ ENGINES = ("voxel", "lattice")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def homogenize_command(
     inclusions: Path,
-    box: str | None,
-    frame: int | None,
+    words: SampleWords,
     engine: str,
     matrix: float,
     inclusion: float | None,
@@ -87,14 +87,14 @@ def homogenize_command(
     for path in (output, plot):
         if path is not None:
             check_place(path, inclusions)
-    table = _read(inclusions, box, frame, boundary)
+    table = read_sample(inclusions, words, unknown_periodic=boundary != "walls")
     if table.wrapped:
-        words = (
+        moved = (
             "1 centre lay outside the box and was"
             if table.wrapped == 1
             else (f"{table.wrapped} centres lay outside the box and were")
         )
-        click.echo(f"etc-engine: note: {words} wrapped into it", err=True)
+        click.echo(f"etc-engine: note: {moved} wrapped into it", err=True)
     given = inclusion if table.conductivity is None else table.conductivity
     if inclusion is not None and table.conductivity is not None:
         click.echo(f"etc-engine: note: --inclusion is not used: {inclusions} has a column 'conductivity'", err=True)
@@ -132,29 +132,6 @@ def _warn_of_overlaps(composite: Composite) -> None:
     divided = ", divided by the radical plane where their conductivities differ"
     differ = bool((composite.inclusion != composite.inclusion[0]).any())
     click.echo(f"etc-engine: warning: {who} union counts once{divided if differ else ''}", err=True)
-
-
-def _read(path: Path, box: str | None, frame: int | None, boundary: str | None) -> ParticleTable:
-    """Inclusions from a file of any format; the box of a CSV file is periodic, unless walls are asked for."""
-    from etc_engine.box import AXES
-    from etc_engine.cli.options import parse_box
-    from etc_engine.errors import InputError
-    from etc_engine.particle_files.formats import format_to_read, read_particles
-
-    if not path.exists():
-        raise InputError(f"there is no file {path}")
-    kind = format_to_read(path)
-    if kind.brings_box:
-        if box is not None:
-            raise InputError(f"{path} is a {kind.name} that brings its own box: leave --box out")
-        return read_particles(path, frame=frame)
-    if box is None:
-        raise InputError("--box is missing: give the edge lengths of the box, such as --box 1,1,1")
-    if frame is not None:
-        raise InputError(f"--frame goes with a dump; {path} is none")
-    walled = parse_box(box, "")
-    periodic = "" if boundary == "walls" else AXES[: walled.dimension]
-    return read_particles(path, parse_box(box, periodic))
 
 
 def _by_voxels(composite: Composite, boundary: str, options: dict[str, Any]) -> Homogenized:

@@ -67,8 +67,8 @@ def pack_command(
     from etc_engine.packing import PackingSpec, pack
     from etc_engine.packing.neighbors import neighbor_pairs
     from etc_engine.packing.radii import parse_radii
-    from etc_engine.particle_files.csv_files import ParticleTable
     from etc_engine.particle_files.formats import write_particles
+    from etc_engine.particle_files.table import ParticleTable
 
     if seed is not None and seed < 0:
         raise InputError(f"--seed must not be negative, found {seed}")

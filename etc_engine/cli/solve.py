@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
+from etc_engine.cli.particle_options import (
+    SampleWords,
+    particle_options,
+    read_sample,
+    warn_of_digits,
+    warn_of_excess,
+    warn_of_sample,
+)
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -19,7 +28,6 @@ if TYPE_CHECKING:
     from etc_engine.engines.pipe.steady import PipeSolution
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.network import ContactNetwork
-    from etc_engine.particle_files.csv_files import ParticleTable
 
     Result = EffectiveConductivity[SteadySolution] | EffectiveConductivity[PipeSolution]
 
@@ -29,9 +37,7 @@ BOND_GAP = 1e-6
 
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
-@click.option("--box", help="Edge lengths, such as 1,1; only for CSV.")
-@click.option("--periodic", help="Periodic axes: x, y or xy; walls elsewhere; only for CSV.")
-@click.option("--frame", type=int, help="Frame of a dump, from 0; the last one by default.")
+@particle_options
 @click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced, arc, exact or pipe.")
 @click.option("--pipe-resistance", help="Resistance of a pipe, with --method pipe: chord (the default) or uniform.")
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
@@ -55,9 +61,7 @@ BOND_GAP = 1e-6
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def solve_command(
     particles: Path,
-    box: str | None,
-    periodic: str | None,
-    frame: int | None,
+    words: SampleWords,
     method: str,
     pipe_resistance: str | None,
     modes: int | None,
@@ -72,9 +76,9 @@ def solve_command(
 ) -> None:
     """Effective conductivity of the disks in a file.
 
-    PARTICLES is a CSV file with the columns x,y,radius[,conductivity], a LAMMPS/LIGGGHTS text dump, or a netCDF
-    (.nc) or VTK (.vtp) file as ``pack`` writes it; all but CSV bring their own box. Walls at
-    x = 0 (temperature 1) and x = L (temperature 0), unless the box is periodic along x.
+    PARTICLES is a CSV file with the columns x,y,radius[,conductivity], a LAMMPS/LIGGGHTS text dump, a netCDF (.nc)
+    or VTK (.vtp) file as ``pack`` writes it, or a file of another DEM code (VTK, extended XYZ, YADE, MercuryDPM); -
+    is standard input. Walls at x = 0 (temperature 1) and x = L (temperature 0), unless the box is periodic along x.
     """
     start = time.perf_counter()
     from math import radians
@@ -91,7 +95,7 @@ def solve_command(
         raise InputError("--modes goes with --method exact or arc: a pipe has one heat flow")
     if contact_angle is None and bond_gap != BOND_GAP:
         raise InputError("--bond-gap goes with --contact-angle, which is missing: overlaps have no gap")
-    table = _read(particles, box, periodic, frame)
+    table = read_sample(particles, words)
     if conductivity is not None and table.conductivity is not None:
         raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
     given = 1.0 if conductivity is None else conductivity
@@ -111,6 +115,10 @@ def solve_command(
     record = _record(network, asked, result, field)
     _warn_of_close_arcs(method, result.solutions[0])
     _warn_of_missing_contacts(network, contact_angle, bond_gap)
+    gap = 0.0 if contact_angle is None else bond_gap
+    warn_of_digits(table, gap, bonded=contact_angle is not None)
+    warn_of_sample(table, [] if table.packing.box.periodic[0] else [0], gap)
+    warn_of_excess(result.tensor, asked.conductivity)
     _write(outputs, result, field, record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
@@ -157,26 +165,6 @@ class _Asked:
             axes=axes,
         )
         return elements, recover_field(elements.solutions[0])
-
-
-def _read(particles: Path, box: str | None, periodic: str | None, frame: int | None) -> ParticleTable:
-    """A particle file of any format, and its box if it brings none."""
-    from etc_engine.cli.options import parse_box
-    from etc_engine.errors import InputError
-    from etc_engine.particle_files.formats import format_to_read, read_particles
-
-    if not particles.exists():
-        raise InputError(f"there is no file {particles}")
-    kind = format_to_read(particles)
-    if frame is not None and not kind.has_frames:
-        raise InputError(f"--frame goes with a dump; {particles} is none")
-    if kind.brings_box:
-        if box is not None or periodic is not None:
-            raise InputError(f"{particles} is a {kind.name} that brings its own box: leave --box and --periodic out")
-        return read_particles(particles, frame=frame)
-    if box is None:
-        raise InputError("--box is missing: give the edge lengths of the box, such as --box 1,1")
-    return read_particles(particles, parse_box(box, periodic or ""))
 
 
 @dataclass(frozen=True)
@@ -284,6 +272,7 @@ def _record(
     from etc_engine.engines.dtem.model_error import chord_error_estimate
     from etc_engine.engines.pipe.steady import PipeSolution
     from etc_engine.realization import Status
+    from etc_engine.structure.filling import find_filling
 
     percolates = bool(result.spans[0])
     record: dict[str, Any] = {"method": asked.method, "conductivity": float(result.tensor[0, 0])}
@@ -300,6 +289,8 @@ def _record(
         record["model_error_estimate"] = chord_error_estimate(solution)
     return record | {
         "particles": network.packing.count,
+        "density": network.packing.density,
+        "fill_height": find_filling(network.packing).fill_height,
         "contacts": network.count,
         "wall_contacts": len(network.walls_of(0)),
         "unknowns": result.unknowns,

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.errors import GeometryError
+from etc_engine.laws.by_dimension import law_of
 from etc_engine.medium.network import ContactNetwork
 
 
@@ -55,6 +56,8 @@ class ContactSides:
         The two sides of each particle contact.
     of_walls : ndarray of int, shape (w,)
         The side of each wall contact.
+    radii : ndarray, shape (n,) [m]
+        Of the particles.
     cuts : InsulatedCuts
         What insulated walls cut off; only ``exact`` heeds it.
     """
@@ -66,7 +69,13 @@ class ContactSides:
     alpha: NDArray[np.float64]
     of_contacts: NDArray[np.int64]
     of_walls: NDArray[np.int64]
+    radii: NDArray[np.float64]
     cuts: InsulatedCuts = NO_CUTS
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.arms.shape[1])
 
     @property
     def particles(self) -> NDArray[np.int64]:
@@ -127,63 +136,76 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
         alpha=alpha[order],
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],
+        radii=packing.radii,
         cuts=cuts,
     )
 
 
 def check_arcs(sides: ContactSides) -> None:
-    """Refuse contact arcs that overlap on one particle.
+    """Refuse contacts that overlap on one particle.
 
     Raises
     ------
     GeometryError
-        Naming the first particle, the distance of the two arcs and their half-angles.
+        Naming the first particle, the distance of the two contacts and their half-angles.
     """
-    refuse_overlap(sides.offsets, sides.theta, sides.alpha)
+    refuse_overlap(sides.offsets, sides.arms, sides.alpha)
 
 
-def refuse_overlap(offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
-    """Raise the error of `check_arcs` for the arcs ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
-    particle, a, b = _overlapping_arcs(offsets, theta, alpha)
+def refuse_overlap(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
+    """Raise the error of `check_arcs` for the contacts ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
+    particle, a, b, apart = _overlapping(offsets, np.ascontiguousarray(arms), alpha)
     if particle >= 0:
-        alpha, theta = np.degrees(alpha[[a, b]]), np.degrees(theta[[a, b]])
-        apart = abs((theta[0] - theta[1] + 180.0) % 360.0 - 180.0)
+        widths = np.degrees(alpha[[a, b]])
         raise GeometryError(
-            f"two contact arcs of particle {particle} overlap: {apart:.4g} degrees apart with half-angles "
-            f"{alpha[0]:.4g} and {alpha[1]:.4g}; use smaller contact angles or less overlap"
+            f"two contact {law_of(arms.shape[1]).contact}s of particle {particle} overlap: {np.degrees(apart):.4g} "
+            f"degrees apart with half-angles {widths[0]:.4g} and {widths[1]:.4g}; use smaller contact angles or less "
+            f"overlap"
         )
 
 
 @njit(cache=True)
-def _overlapping_arcs(
-    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]
-) -> tuple[int, int, int]:
-    """First particle with overlapping arcs and the two sides, or -1."""
+def _separation(arms: NDArray[np.float64], a: int, b: int) -> float:
+    """Angle between two directions, 2 arcsin(|u - v|/2) of the unit vectors u and v."""
+    d = arms.shape[1]
+    first, second, square = 0.0, 0.0, 0.0
+    for axis in range(d):
+        first += arms[a, axis] ** 2
+        second += arms[b, axis] ** 2
+    for axis in range(d):
+        square += (arms[a, axis] / np.sqrt(first) - arms[b, axis] / np.sqrt(second)) ** 2
+    return 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(square)))
+
+
+@njit(cache=True)
+def _overlapping(
+    offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]
+) -> tuple[int, int, int, float]:
+    """First particle with overlapping contacts, the two sides and the angle between them, or -1."""
     for p in range(offsets.size - 1):
         for a in range(offsets[p], offsets[p + 1]):
             for b in range(offsets[p], a):
-                separation = abs(theta[a] - theta[b])
-                if min(separation, 2.0 * np.pi - separation) < alpha[a] + alpha[b]:
-                    return p, a, b
-    return -1, -1, -1
+                separation = _separation(arms, a, b)
+                if separation < alpha[a] + alpha[b]:
+                    return p, a, b, separation
+    return -1, -1, -1, 0.0
 
 
 def count_close_arcs(sides: ContactSides) -> int:
-    """Pairs of arcs on one particle whose gap is less than the sum of their half-angles.
+    """Pairs of contacts on one particle whose gap is less than the sum of their half-angles.
 
     There the flux through one contact feels the other, and ``chord``, which takes every source for a far one,
     loses its accuracy.
     """
-    return int(_close_arcs(sides.offsets, sides.theta, sides.alpha))
+    return int(_close(sides.offsets, np.ascontiguousarray(sides.arms), sides.alpha))
 
 
 @njit(cache=True)
-def _close_arcs(offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]) -> int:
+def _close(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> int:
     number = 0
     for p in range(offsets.size - 1):
         for a in range(offsets[p], offsets[p + 1]):
             for b in range(offsets[p], a):
-                separation = abs(theta[a] - theta[b])
-                if min(separation, 2.0 * np.pi - separation) < 2.0 * (alpha[a] + alpha[b]):
+                if _separation(arms, a, b) < 2.0 * (alpha[a] + alpha[b]):
                     number += 1
     return number

@@ -10,8 +10,8 @@ import xarray as xr
 
 from etc_engine.box import Box
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.particle_files.csv_files import ParticleTable
 from etc_engine.particle_files.formats import write_particles
+from etc_engine.particle_files.table import ParticleTable
 
 RADIUS_3D = float(np.cbrt(0.75 * 0.3 / np.pi))
 
@@ -85,7 +85,7 @@ def test_walls_leave_only_the_diagonal(etc_engine, table):
 
 
 def test_a_packing_brings_its_own_box(etc_engine, tmp_path):
-    pair = [[0.0, 0.0, 0.3], [0.0, 0.0, 1.3]]  # one sphere alone is flat enough to be read from a dump as a disk
+    pair = [[0.0, 0.0, 0.3], [0.0, 0.0, 1.3]]
     packing = ParticlePacking(pair, [RADIUS_3D] * 2, Box((1.0, 1.0, 2.0), (True,) * 3))
     for name in ("p.nc", "p.dump"):
         path = tmp_path / name
@@ -94,7 +94,8 @@ def test_a_packing_brings_its_own_box(etc_engine, tmp_path):
         record = json.loads(done.stdout)
         assert record["boundary"] == "periodic"
         assert record["conductivity_tensor"][2][2] == pytest.approx(1.7967699, rel=2e-3)
-    assert "leave --box out" in refused(etc_engine("homogenize", path, "--box", "1,1,1", "--matrix", 1))
+    words = ("--box", "1,1,1", "--periodic", "", "--matrix", 1, "--inclusion", 2)
+    assert "outside the box" in refused(etc_engine("homogenize", path, *words))
 
 
 def test_both_engines_agree(etc_engine, sphere):
@@ -162,7 +163,7 @@ BAD = [
     (("--inclusion", 2, "--engine", "lattice", "--resolution", 32), "--resolution does not go with --engine lattice"),
     (("--inclusion", 2, "--box", "1,1"), "a 2D box needs"),
     (("--inclusion", 2, "--box", "1,-1,1"), "positive"),
-    (("--inclusion", 2, "--frame", 0), "--frame goes with a dump"),
+    (("--inclusion", 2, "--frame", 0), "holds one packing: leave the frame out"),
     (("--inclusion", 2, "--plot", "p.bmp"), "a picture is written as"),
     (("--inclusion", 2, "--resolution", 0), "the resolution is a whole number of at least 1, found 0"),
     (("--inclusion", 2, "--resolution", 1000000), "needs about 1.68e+11 GB of memory"),

@@ -104,10 +104,10 @@ def test_dump_brings_its_box_and_frames(etc_engine):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((BED, "--box", "1,1"), "brings its own box"),
+        ((BED, "--box", "0.1,0.1"), "has its centre outside the box"),
         ((BED, "--frame", 9), "there is no frame 9"),
         ((TABLE_2,), "--box is missing"),
-        ((TABLE_2, "--box", "1,1", "--frame", 0), "--frame goes with a dump"),
+        ((TABLE_2, "--box", "1,1", "--frame", 0), "holds one packing: leave the frame out"),
         ((TABLE_2, "--box", "1,1", "--vtk", "a.vtk"), ".vtp"),
         ((TABLE_2, "--box", "1,1", "--plot", "a.xyz"), "a.xyz"),
         ((TABLE_2, "--box", "1,1", "-o", "nowhere/a.nc"), "cannot write"),

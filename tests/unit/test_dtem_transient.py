@@ -16,7 +16,7 @@ from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.methods import find_method
 from etc_engine.engines.dtem.steady import solve_steady
-from etc_engine.engines.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
+from etc_engine.engines.dtem.storage import readings_of_parts, stored_areas, storing_elements
 from etc_engine.engines.dtem.transient import contact_flows, transient_system
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.disk import mutual_resistance, self_resistance
@@ -39,7 +39,7 @@ def one_disk(theta, alpha) -> ContactSides:
     n = theta.size
     arms = np.stack([np.cos(theta), np.sin(theta)], axis=1)
     return ContactSides(
-        np.array([0, n]), np.arange(n), arms, theta, alpha, np.zeros((0, 2), dtype=np.int64), np.arange(n)
+        np.array([0, n]), np.arange(n), arms, theta, alpha, np.zeros((0, 2), dtype=np.int64), np.arange(n), np.ones(1)
     )
 
 
@@ -173,7 +173,7 @@ def test_a_dipole_decays_at_24_over_7_close_to_the_disks_own_rate():
     rates, vectors = np.linalg.eigh(3.0 * K_ss / np.pi)
     np.testing.assert_allclose(rates, [0.0, 24 / 7, 24 / 7], atol=1e-13)
     assert rates[2] == pytest.approx(jnp_zeros(1, 1)[0] ** 2, rel=0.012)
-    assert np.abs(FROM_THIRDS[1:] @ vectors[:, 0]).max() < 1e-15
+    assert np.abs(readings_of_parts(2)[1:] @ vectors[:, 0]).max() < 1e-15
 
 
 def critical_half_angle(contacts, dipoles):

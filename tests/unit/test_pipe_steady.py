@@ -172,9 +172,6 @@ def test_what_is_refused(random_network):
         pipe_conductivity(random_network, resistance="round")
     with pytest.raises(InputError, match="the conductivity must be positive"):
         pipe_conductivity(random_network, conductivity=0.0)
-    spheres = ParticlePacking([[0.5, 0.5, 0.5]], [0.5], Box((1.0, 1.0, 1.0)))
-    with pytest.raises(InputError, match="made of disks"):
-        pipe_conductivity(bonded_contacts(spheres, 0.1))
     with pytest.raises(GeometryError, match="overlap"):
         pipe_conductivity(random_network.with_half_angle(np.radians(40.0)))
     with pytest.raises(ConvergenceError, match="do not balance"):

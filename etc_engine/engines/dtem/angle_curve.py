@@ -73,7 +73,7 @@ def solve_angle_curve(
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional; its own angles do not count.
+        Its own angles do not count.
     axes : tuple of int
         A single walled axis, or periodic axes only.
     half_angles : sequence of float [rad]
@@ -128,7 +128,8 @@ def solve_angle_curve(
 def _prepare(
     network: ContactNetwork, axes: tuple[int, ...], method: str, material: Material, backbone: Backbone | None
 ) -> _Load:
-    variant, modes = find_method(method), flux_modes(method, None)
+    dimension = network.packing.dimension
+    variant, modes = find_method(method, dimension), flux_modes(method, None, dimension)
     backbone = backbone or find_backbone(network, axes)
     if variant.exact_cuts:
         backbone = restore_dead_ends(network, backbone)

@@ -263,9 +263,10 @@ def mean_field_conductivity(
     conductivity: ArrayLike = 1.0,
     contact_resistance: ArrayLike = 0.0,
 ) -> float:
-    """Half the trace of the conductivity of the pipe network when every particle follows the mean gradient.
+    """Mean over the axes of the conductivity of the pipe network when every particle follows the mean gradient.
 
-    k = (1/2A) sum_c C_c d_c^2,  C_c = 1/(h_ii/kappa_i + h_jj/kappa_j + R_c), over the particle contacts.
+    k = (1/dV) sum_c C_c d_c^2,  C_c = 1/(h_ii + h_jj + R_c), over the particle contacts; d = 2 or 3 axes, V the area or
+    volume of the box.
 
     Parameters
     ----------
@@ -296,4 +297,4 @@ def mean_field_conductivity(
         network, resistance=resistance, conductivity=conductivity, contact_resistance=contact_resistance
     )
     squares = (network.branches**2).sum(axis=1)
-    return float(conductances @ squares / (2.0 * network.packing.box.volume))
+    return float(conductances @ squares / (network.packing.dimension * network.packing.box.volume))

@@ -25,99 +25,220 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.element import Elements, condense, packed_starts
-from etc_engine.errors import GeometryError
-from etc_engine.laws.rings import CondensedPairs, FacingSpheres, legendre_means
+from etc_engine.errors import GeometryError, InputError
+from etc_engine.laws.rings import FacingSpheres, condense_pairs, legendre_means
+from etc_engine.medium.facets import FacetLinks
 
 TERMS = 100
 """Legendre terms between two facets, L."""
 
 
+SMALL_FACET = 0.02
+"""Facets below this part of the squared radius of the smaller sphere are columns alone."""
+REPAIR_POWER = 1.25
+_NEGLIGIBLE_COLUMN = 1e-9  # in squared radii
+
+
+@dataclass(frozen=True, eq=False)
+class FacetMaterial:
+    """What spheres and pores are made of.
+
+    Parameters
+    ----------
+    conductivity : ndarray, shape (n,) [W/(m K)]
+        Of each sphere.
+    fluid : ndarray, shape (m + w,) [W/(m K)]
+        Conductivity of the continuum fluid in each link, between spheres first, at walls after them.
+    open_fluid : ndarray, shape (m + w,) [W/(m K)]
+        Of the fluid in the open pore beyond the spheres, the columns; below `fluid` where the gas is rarefied.
+    jumps : ndarray, shape (m + w,) [m]
+        Temperature jump lengths of a link, both surfaces together.
+    radiation : ndarray, shape (m + w,) [W/(m2 K)]
+        Radiative conductance per facing area of each link.
+    """
+
+    conductivity: NDArray[np.float64]
+    fluid: NDArray[np.float64]
+    open_fluid: NDArray[np.float64]
+    jumps: NDArray[np.float64]
+    radiation: NDArray[np.float64]
+
+
 @dataclass(frozen=True, eq=False)
 class FacetSides:
-    """Nodes as each sphere sees them, sorted by sphere.
+    """Nodes of a packing as each sphere sees them, sorted by sphere.
 
     Parameters
     ----------
     offsets : ndarray of int, shape (n + 1,)
         The sides of sphere p are rows ``offsets[p]`` to ``offsets[p + 1]``.
     nodes : ndarray of int, shape (s,)
-        Node of each side.
-    pairs : ndarray of int, shape (s,)
-        Row of the node among the condensed pairs; -1 for a column.
+        Node of each side: facets and columns between spheres first, those at driven walls after them.
     ends : ndarray of int, shape (s,)
-        0 or 1: which sphere of the pair this is.
+        0 or 1: which sphere of its link this is.
     normals : ndarray, shape (s, 3)
         Unit vectors from the centre through the facet.
-    added : ndarray, shape (s,) [K/W]
-        This side's part of the resistance of the fluid.
+    arms : ndarray, shape (s, 3) [m]
+        Vectors towards the facet; at the two sides of a link they differ by the branch vector.
+    links : ndarray of int, shape (nodes,)
+        Link of each node.
+    columns : ndarray, shape (nodes,) [m2]
+        Area of a column; 0 for a node with rings.
+    between : int
+        Number of nodes between spheres.
     """
 
     offsets: NDArray[np.int64]
     nodes: NDArray[np.int64]
-    pairs: NDArray[np.int64]
     ends: NDArray[np.int64]
     normals: NDArray[np.float64]
-    added: NDArray[np.float64]
+    arms: NDArray[np.float64]
+    links: NDArray[np.int64]
+    columns: NDArray[np.float64]
+    between: int
+
+    @property
+    def spheres(self) -> NDArray[np.int64]:
+        """Sphere of each side, shape (s,)."""
+        return np.repeat(np.arange(self.offsets.size - 1), np.diff(self.offsets))
 
 
-def cap_overlap(
-    owners: NDArray[np.int64], normals: NDArray[np.float64], sines: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
-    r"""S = sum_j n_j n_j^T (1 - cos^3 psi_j)/2 of every sphere, shape (n, 3, 3).
+def facet_sides(links: FacetLinks, driven: NDArray[np.bool_], fluid: bool = True) -> FacetSides:
+    """Nodes and sides of all links between spheres and of those with a driven wall.
 
     Parameters
     ----------
-    owners : ndarray of int, shape (s,)
-        Sphere of each cap; caps that carry no heat (insulated walls) tile the sphere too.
-    normals : ndarray, shape (s, 3)
-    sines : ndarray, shape (s,)
-        sin psi.
-    count : int
-        Number of spheres, n.
+    links : FacetLinks
+    driven : ndarray of bool, shape (w,)
+        Wall facets whose wall has a temperature.
+    fluid : bool
+        Whether there are columns of fluid; without it heat crosses the pores by radiation alone.
     """
-    weight = 0.5 * (1.0 - np.maximum(1.0 - sines**2, 0.0) ** 1.5)
-    out = np.empty((count, 3, 3))
-    for a in range(3):
-        for b in range(a + 1):
-            out[:, a, b] = np.bincount(owners, weight * normals[:, a] * normals[:, b], minlength=count)
-            out[:, b, a] = out[:, a, b]
-    return out
+    radii, m = links.packing.radii, links.count
+    small = np.concatenate([radii[links.pairs].min(axis=1, initial=np.inf), radii[links.wall_particles]])
+    area = np.concatenate([links.areas, links.wall_areas])
+    wide = (area >= SMALL_FACET * small**2) | (links.contacts > 0.0)
+    column = np.where(wide, area - np.pi * small**2, area)
+    piped = (column > _NEGLIGIBLE_COLUMN * small**2) & fluid
+    live = np.concatenate([np.ones(m, dtype=np.bool_), driven])
+    groups = [np.flatnonzero(flags & live) for flags in (wide, piped)]
+    of_links = np.concatenate([g[g < m] for g in groups] + [g[g >= m] for g in groups])
+    is_column = np.concatenate([np.full(int(np.sum(side)), kind) for side, kind in _kinds(groups, m)])
+    between = int((of_links < m).sum())
+    pairs, walls = links.pairs[of_links[:between]], of_links[between:] - m
+    share = radii[pairs[:, :1]] / radii[pairs].sum(axis=1, keepdims=True)
+    branches = links.branches[of_links[:between]]
+    toward = links.wall_normals[walls] * links.wall_distances[walls, None]
+    owner = np.concatenate([pairs[:, 0], pairs[:, 1], links.wall_particles[walls]])
+    arms = np.concatenate([branches * share, -branches * (1.0 - share), toward])
+    order = np.argsort(owner, kind="stable")
+    count = np.arange(of_links.size)
+    arms = arms[order]
+    return FacetSides(
+        np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=radii.size))]),
+        np.concatenate([count[:between], count])[order],
+        np.concatenate([np.zeros(between, np.int64), np.ones(between, np.int64), np.zeros(walls.size, np.int64)])[
+            order
+        ],
+        arms / np.linalg.norm(arms, axis=1, keepdims=True),
+        arms,
+        of_links,
+        np.where(is_column, column[of_links], 0.0),
+        between,
+    )
+
+
+def _kinds(groups: list[NDArray[np.int64]], m: int) -> list[tuple[NDArray[np.bool_], bool]]:
+    """The four runs of nodes, rings and columns between spheres and at walls, and which are columns."""
+    rings, pipes = groups
+    return [(rings < m, False), (pipes < m, True), (rings >= m, False), (pipes >= m, True)]
+
+
+def facing_spheres(links: FacetLinks, material: FacetMaterial, rows: NDArray[np.int64]) -> FacingSpheres:
+    """The links ``rows`` as pairs of facing spheres; a wall link is half of the sphere and its mirror image."""
+    m, radii, kappa = links.count, links.packing.radii, material.conductivity
+    wall = rows >= m
+    ends = np.empty((rows.size, 2), dtype=np.int64)
+    ends[~wall] = links.pairs[rows[~wall]]
+    ends[wall] = links.wall_particles[rows[wall] - m, None]
+    distances = np.concatenate([np.linalg.norm(links.branches, axis=1), 2.0 * links.wall_distances])[rows]
+    area = np.concatenate([links.areas, links.wall_areas])[rows]
+    twice = np.where(wall, 2.0, 1.0)
+    small = radii[ends].min(axis=1, initial=np.inf)
+    contacts = links.contacts[rows]
+    return FacingSpheres(
+        distances,
+        np.minimum(np.maximum(np.sqrt(area / np.pi), contacts), small),
+        contacts,
+        radii[ends],
+        kappa[ends],
+        material.fluid[rows],
+        twice * material.jumps[rows],
+        material.radiation[rows] / twice,
+        twice * links.bonds[rows],
+    )
 
 
 def facet_resistances(
-    sides: FacetSides,
-    facing: FacingSpheres,
-    condensed: CondensedPairs,
-    solids: tuple[NDArray[np.float64], NDArray[np.float64]],
-    repair: NDArray[np.float64],
+    links: FacetLinks, material: FacetMaterial, sides: FacetSides
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Resistance matrices H of all spheres [K/W], packed as (starts, values).
 
-    Parameters
-    ----------
-    sides : FacetSides
-    facing, condensed : FacingSpheres, CondensedPairs
-        The pairs behind the nodes.
-    solids : (ndarray, ndarray), shapes (n,)
-        Radii [m] and conductivities [W/(m K)].
-    repair : ndarray, shape (n, 3, 3)
-        f (S^-1 - I).
+    Raises
+    ------
+    InputError
+        If a link has neither fluid nor radiation, or a value is out of range.
     """
+    if not (material.fluid + material.radiation > 0.0).all():
+        raise InputError("facet links need pores that conduct: a fluid of conductivity > 0, or radiation")
+    ringed = np.flatnonzero(sides.columns == 0.0)
+    facing = facing_spheres(links, material, sides.links[ringed])
+    condensed = condense_pairs(facing)
+    half = np.where(np.arange(sides.links.size) < sides.between, 0.5, 1.0)  # a wall link has one side
+    mirrored = np.where(sides.links < links.count, 1.0, 0.5)
+    pair = np.full(sides.links.size, -1, dtype=np.int64)
+    pair[ringed] = np.arange(ringed.size)
+    added = np.zeros(sides.links.size)
+    added[ringed] = condensed.gaps * mirrored[ringed] * half[ringed]
+    lengths = np.concatenate([np.linalg.norm(links.branches, axis=1), links.wall_distances])[sides.links]
+    tubes = sides.columns > 0.0
+    added[tubes] = lengths[tubes] / (material.open_fluid[sides.links[tubes]] * sides.columns[tubes]) * half[tubes]
     starts = packed_starts(sides.offsets)
     values = np.zeros(int(starts[-1]))
     l = np.arange(1, TERMS + 1)
-    radii, conductivities = solids
     _fill(
-        (sides.offsets, sides.pairs, sides.ends, sides.normals, sides.added),
+        (sides.offsets, pair[sides.nodes], sides.ends, sides.normals, added[sides.nodes]),
         np.ascontiguousarray(facing.rows),
         (condensed.shapes, condensed.constrictions),
-        1.0 / (4.0 * np.pi * conductivities * radii),
-        repair,
+        1.0 / (4.0 * np.pi * material.conductivity * links.packing.radii),
+        _repair(links, material),
         (2 * l + 1) / l * np.sinc(l / (TERMS + 1)),
         starts,
         values,
     )
     return starts, values
+
+
+def _repair(links: FacetLinks, material: FacetMaterial) -> NDArray[np.float64]:
+    """The mending f (S^-1 - I) of l = 1, shape (n, 3, 3); caps at insulated walls tile the sphere too."""
+    radii, n = links.packing.radii, links.packing.count
+    normals = links.branches / np.linalg.norm(links.branches, axis=1, keepdims=True)
+    owner = np.concatenate([links.pairs[:, 0], links.pairs[:, 1], links.wall_particles])
+    normals = np.concatenate([normals, -normals, links.wall_normals])
+    small = radii[links.pairs].min(axis=1, initial=np.inf)
+    rho = np.minimum(np.sqrt(links.areas / np.pi), small)
+    at_walls = np.minimum(np.sqrt(links.wall_areas / np.pi), radii[links.wall_particles])
+    sine = np.minimum(np.concatenate([rho, rho, at_walls]) / radii[owner], 1.0)
+    weight = 0.5 * (1.0 - (1.0 - sine**2) ** 1.5)
+    overlap = np.empty((n, 3, 3))
+    fluid = np.concatenate([material.open_fluid[: links.count], material.open_fluid])
+    for a in range(3):
+        for b in range(a + 1):
+            overlap[:, a, b] = np.bincount(owner, weight * normals[:, a] * normals[:, b], minlength=n)
+            overlap[:, b, a] = overlap[:, a, b]
+    mean_fluid = np.bincount(owner, fluid * weight, minlength=n) / np.bincount(owner, weight, minlength=n)
+    factor = (2.0 * mean_fluid / (mean_fluid + material.conductivity)) ** REPAIR_POWER
+    return np.asarray(factor[:, None, None] * (np.linalg.inv(overlap) - np.eye(3)))
 
 
 @njit(cache=True)

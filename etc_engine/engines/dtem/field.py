@@ -72,7 +72,7 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
     network, backbone, axis = solution.network, solution.backbone, solution.axes[load]
     packing = network.packing
     periodic = packing.box.periodic[axis]
-    variant = find_method(solution.method)
+    variant = find_method(solution.method, packing.dimension)
     cuts = insulated_cuts(network, driven_walls(network, solution.axes)) if variant.exact_cuts else NO_CUTS
     sides = contact_sides(network, cuts)
     rows = np.empty(solution.sides.nodes.size, dtype=np.int64)

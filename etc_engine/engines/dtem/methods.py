@@ -16,7 +16,7 @@ from etc_engine.engines.dtem.element import Elements, Material, Resistances
 from etc_engine.engines.dtem.exact import element as exact
 from etc_engine.engines.dtem.exact.element import exact_elements, exact_potentials
 from etc_engine.errors import InputError
-from etc_engine.laws.disk import SELF_RESISTANCE
+from etc_engine.laws.by_dimension import LAWS
 from etc_engine.medium.sides import ContactSides
 
 
@@ -51,36 +51,43 @@ class Method:
 MOST_MODES = 10
 """Beyond these the matrices of an element lose their last digits."""
 
+_CLOSED_FORMS = {
+    name: Method(
+        partial(closed_form_elements, method=name),
+        partial(closed_form_potentials, method=name),
+        modes=1,
+        uniform_flux=name != "chord",
+        resistances=partial(closed_form_resistances, method=name),
+    )
+    for name in LAWS[2].self_resistances
+}
 METHODS: Mapping[str, Method] = {
-    **{
-        name: Method(
-            partial(closed_form_elements, method=name),
-            partial(closed_form_potentials, method=name),
-            modes=1,
-            uniform_flux=name != "chord",
-            resistances=partial(closed_form_resistances, method=name),
-        )
-        for name in SELF_RESISTANCE
-    },
+    **_CLOSED_FORMS,
     "arc": Method(arc_elements, arc_potentials, arc.MODES, uniform_flux=False, resistances=arc_resistances),
     "exact": Method(exact_elements, exact_potentials, exact.MODES, uniform_flux=False, exact_cuts=True),
 }
+METHODS_BY_DIMENSION: Mapping[int, Mapping[str, Method]] = {
+    2: METHODS,
+    3: {name: _CLOSED_FORMS[name] for name in LAWS[3].self_resistances},
+}
 
 
-def find_method(name: str) -> Method:
-    """The variant of that name.
+def find_method(name: str, dimension: int = 2) -> Method:
+    """The variant of that name for disks (2) or spheres (3).
 
     Raises
     ------
     InputError
         If there is none.
     """
-    if name not in METHODS:
-        raise InputError(f"unknown method {name!r}: expected one of {', '.join(METHODS)}")
-    return METHODS[name]
+    known = METHODS_BY_DIMENSION[dimension]
+    if name not in known:
+        particles = "" if dimension == 2 else f" of a {LAWS[dimension].name}"
+        raise InputError(f"unknown method {name!r}{particles}: expected one of {', '.join(known)}")
+    return known[name]
 
 
-def flux_modes(name: str, modes: int | None) -> int:
+def flux_modes(name: str, modes: int | None, dimension: int = 2) -> int:
     """Flux modes of a contact: those asked for, or the method's own.
 
     Raises
@@ -88,7 +95,7 @@ def flux_modes(name: str, modes: int | None) -> int:
     InputError
         If the method does not have them.
     """
-    own = find_method(name).modes
+    own = find_method(name, dimension).modes
     if modes is None or modes == own:
         return own
     if own == 1:

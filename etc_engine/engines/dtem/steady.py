@@ -94,7 +94,7 @@ def solve_steady(
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional.
+        Of disks or spheres.
     axes : tuple of int
         A single walled axis, or periodic axes only.
     method : str
@@ -123,10 +123,9 @@ def solve_steady(
     ----------
     Feng, Han, Li, Owen 2008, Box 1, doi:10.1016/j.jcp.2008.01.031.
     """
-    if network.packing.dimension != 2:
-        raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
+    dimension = network.packing.dimension
     material = make_material(network, conductivity, contact_resistance)
-    variant, modes = find_method(method), flux_modes(method, modes)
+    variant, modes = find_method(method, dimension), flux_modes(method, modes, dimension)
     if backbone is None:
         backbone = find_backbone(network, axes)
     driven = driven_walls(network, axes)

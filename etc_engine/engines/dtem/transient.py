@@ -1,6 +1,6 @@
 """Heat conduction in time through a contact network: the discrete thermal element method with storage.
 
-Contacts are nodes without capacity, particles store heat at their mean temperature (or in three thirds, which adds
+Contacts are nodes without capacity, particles store heat at their mean temperature (or in d + 1 parts, which adds
 their dipoles; see `etc_engine.engines.dtem.storage`):
 
     C dT/dt = f(t) - K T,     K = sum over the particles of their storing elements,
@@ -21,7 +21,7 @@ from scipy.sparse import csr_matrix, diags_array
 from etc_engine.engines.dtem.assembly import assemble
 from etc_engine.engines.dtem.element import Elements
 from etc_engine.engines.dtem.steady import make_material, per_particle
-from etc_engine.engines.dtem.storage import FROM_THIRDS, stored_areas, storing_elements
+from etc_engine.engines.dtem.storage import readings_of_parts, stored_areas, storing_elements
 from etc_engine.errors import InputError
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import ContactSides, check_arcs, contact_sides
@@ -52,7 +52,7 @@ class TransientSystem:
     walls : WallNodes
         The unknown or the wall of each node of the elements.
     states : int
-        Of a particle: 1, or 3 with dipoles.
+        Of a particle: 1, or d + 1 with dipoles.
     """
 
     heat: HeatSystem
@@ -83,11 +83,11 @@ class TransientSystem:
         return np.asarray(self._states(temperatures).mean(axis=1))
 
     def dipoles(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Amplitudes D_c, D_s of each particle's linear part, shape (n, 2) [K]; zero where there are no such states."""
-        states = self._states(temperatures)
+        """Amplitudes D of each particle's linear part, shape (n, d) [K]; zero where there are no such states."""
+        states, dimension = self._states(temperatures), self.network.packing.dimension
         if self.states == 1:
-            return np.zeros((states.shape[0], 2))
-        return np.asarray(states @ FROM_THIRDS[1:].T)
+            return np.zeros((states.shape[0], dimension))
+        return np.asarray(states @ readings_of_parts(dimension)[1:].T)
 
     def contact_temperatures(self, time: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
         """Node temperature of each particle contact, then of each wall contact that takes part [K]."""
@@ -154,7 +154,7 @@ def transient_system(
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional. Rattlers and dead ends take part: they keep or take up heat.
+        Rattlers and dead ends take part: they keep or take up heat.
     walls : mapping of str to condition
         By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
     method : str
@@ -206,8 +206,6 @@ def transient_system(
     >>> system.particle_temperatures(late.temperatures).round(6)
     array([1.])
     """
-    if network.packing.dimension != 2:
-        raise InputError("the discrete thermal element method is two-dimensional; the packing has 3 axes")
     conditions = wall_conditions(network.packing.box, walls)
     kept = np.array([not isinstance(c, Insulated) for c in conditions])[network.walls]
     everywhere = np.ones(network.count, dtype=np.bool_)
@@ -218,7 +216,7 @@ def transient_system(
     sides = contact_sides(reduced)
     check_arcs(sides)
     elements = storing_elements(sides, material, method, dipoles=dipoles, modes=modes)
-    states = 3 if dipoles else 1
+    states = network.packing.dimension + 1 if dipoles else 1
     capacities = np.repeat(density * stored_areas(network, method) / states, states)
     nodes = number_nodes(reduced, conditions, elements.modes, capacities.size)
     return TransientSystem(

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.engines.dtem.steady import make_material
 from etc_engine.errors import InputError
-from etc_engine.laws.disk import SELF_RESISTANCE
+from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import check_arcs, contact_sides
 
@@ -24,12 +24,12 @@ def pipe_conductances(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Conductances of the contacts of a network.
 
-    C = 1/(h_ii/kappa_i + h_jj/kappa_j + R_c) between two particles, C = 1/(h_ii/kappa_i + R_c) at a wall.
+    C = 1/(h_ii + h_jj + R_c) between two particles, C = 1/(h_ii + R_c) at a wall.
 
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional.
+        Of disks or spheres.
     resistance : str
         ``chord`` or ``uniform``: which h_ii a pipe has.
     conductivity : float or array_like, shape (n,) [W/(m K)]
@@ -67,14 +67,13 @@ def pipe_conductances(
     >>> bool(np.isclose(walls[0], 2.0 * contacts[0]))
     True
     """
-    if network.packing.dimension != 2:
-        raise InputError("the pipe network is made of disks; the packing has 3 axes")
     if resistance not in PIPE_RESISTANCES:
         raise InputError(f"unknown pipe resistance {resistance!r}: expected chord or uniform")
     material = make_material(network, conductivity, contact_resistance)
     check_arcs(contact_sides(network))
-    own = SELF_RESISTANCE[PIPE_RESISTANCES[resistance]]
-    m, kappa = network.count, material.conductivity
+    dimension = network.packing.dimension
+    own = law_of(dimension).self_resistances[PIPE_RESISTANCES[resistance]]
+    m, kappa = network.count, material.conductivity * length_scales(network.packing.radii, dimension)
     between = (own(network.angles) / kappa[network.pairs]).sum(axis=1) + material.contact_resistance[:m]
     at_wall = own(network.wall_angles) / kappa[network.wall_particles] + material.contact_resistance[m:]
     return 1.0 / between, 1.0 / at_wall

@@ -8,7 +8,7 @@ from etc_engine.engines.dtem.field import ParticleField
 from etc_engine.engines.dtem.steady import driven_walls
 from etc_engine.engines.pipe.conductances import PIPE_RESISTANCES
 from etc_engine.engines.pipe.steady import PipeSolution
-from etc_engine.laws.disk import SELF_RESISTANCE
+from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.sides import contact_sides
 
 
@@ -28,13 +28,14 @@ def pipe_field(solution: PipeSolution, load: int = 0) -> ParticleField:
     ParticleField
     """
     network, material, m = solution.network, solution.material, solution.network.count
-    own = SELF_RESISTANCE[PIPE_RESISTANCES[solution.resistance]]
     sides = contact_sides(network)
+    own = law_of(sides.dimension).self_resistances[PIPE_RESISTANCES[solution.resistance]]
+    scales = material.conductivity * length_scales(sides.radii, sides.dimension)
     into = np.zeros(sides.nodes.size)
     flows, wall_flows = solution.contact_flows[:, load], solution.wall_flows[:, load]
     into[sides.of_contacts] = np.stack([-flows, flows], axis=1)
     into[sides.of_walls] = -wall_flows
-    rises = own(sides.alpha) / material.conductivity[sides.particles] * into
+    rises = own(sides.alpha) / scales[sides.particles] * into
     temperatures = solution.temperatures[:, load]
     face = temperatures[network.pairs[:, 0]] + rises[sides.of_contacts[:, 0]]
     drops = 0.5 * material.contact_resistance[:m] * flows

@@ -98,7 +98,7 @@ def pipe_transient(
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional. All particles take part; one without contacts keeps its heat.
+        All particles take part; one without contacts keeps its heat.
     walls : mapping of str to condition
         By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
     resistance, conductivity, contact_resistance

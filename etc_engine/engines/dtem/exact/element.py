@@ -159,7 +159,7 @@ def cut_chords(
     alpha = np.concatenate([sides.alpha[kept], cuts.alpha])[order]
     exponents = np.concatenate([edge_exponents(sides, material)[kept], np.ones(cuts.particles.size)])[order]
     signs = np.concatenate([sides.mode_signs[kept], np.ones(cuts.particles.size)])[order]
-    refuse_overlap(offsets, theta, alpha)
+    refuse_overlap(offsets, np.stack([np.cos(theta), np.sin(theta)], axis=1), alpha)
     levels = _choose_levels(offsets, theta, alpha, modes)
     return Chords(offsets, rows, theta, alpha, exponents, levels, signs)
 
