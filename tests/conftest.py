@@ -71,7 +71,7 @@ def made_sweep():
     all values. The solid fraction is ``solid(density)``.
     """
     from etc_engine.durable.provenance import this_run
-    from etc_engine.realization import Cell, Realization, Status
+    from etc_engine.realization import Outcome, Realization, Status
     from etc_engine.study.sweep import parse_study
     from etc_engine.sweep.attributes import global_attributes
     from etc_engine.sweep.dataset import assemble
@@ -79,13 +79,13 @@ def made_sweep():
     from etc_engine.sweep.records import Record
     from etc_engine.sweep.table import tabulate
 
-    def cell(value, dimension: int, mean_field: float) -> Cell:
+    def cell(value, dimension: int, mean_field: float) -> Outcome:
         if value is None:
-            return Cell(Status.PACKING_FAILED, "made to fail")
+            return Outcome(Status.PACKING_FAILED, "made to fail")
         tensor = np.full((dimension, dimension), np.nan)
         np.fill_diagonal(tensor, value)
         status = Status.OK if tensor[0, 0] > 0.0 else Status.NOT_PERCOLATING
-        return Cell(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
+        return Outcome(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
 
     def build(text: str, conduct, solid=lambda density: density, mean_field: float = 0.5):
         study = parse_study(text)
@@ -97,9 +97,7 @@ def made_sweep():
         records = []
         for density in study.densities:
             for r in range(study.statistics.realizations):
-                values = tuple(
-                    cell(conduct(density, one, m, r), d, mean_field) for one in swept for m in study.conduction.methods
-                )
+                values = tuple(cell(conduct(density, one, m, r), d, mean_field) for one in swept for m in study.methods)
                 result = Realization(100, density, solid(density), 0.01, values)
                 unit = Unit(density, r)
                 records.append(Record(unit, result, 0, "here", 0.0, 1.0))

@@ -61,7 +61,7 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
             raise InputError(f"{name} is only valid with studies of kind 'network', this one is of kind 'meshless'")
-    check_place(wanted.output, wanted.study)
+    check_place(wanted.output, wanted.study, replaces_result=True)
     result = run_study(content, str(wanted.study))
     with replacing(wanted.output) as file:
         result.assign_attrs(study_file=wanted.text).to_netcdf(file)
@@ -134,7 +134,7 @@ def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
             raise OutputError(f"the frames of {wanted.vtk} go to the folder of the input: choose another name")
     for path in (wanted.output, wanted.plot, wanted.vtk):
         if path is not None:
-            check_place(path, *inputs)
+            check_place(path, *inputs, replaces_result=path == wanted.output)
 
 
 def _finish(study: NetworkStudy, wanted: Wanted) -> int:

@@ -270,8 +270,13 @@ def _doubt(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases) -> x
     """
     if not medium.pores_conduct:
         return 0.0
-    discretization = dataset["relative_energy_error"].mean("realization")
-    return (result["half_width"] / result["conductivity_mean"]).fillna(0.0) + discretization.fillna(0.0)
+    errors = _errors(dataset).mean("realization")
+    return (result["half_width"] / result["conductivity_mean"]).fillna(0.0) + errors
+
+
+def _errors(dataset: xarray.Dataset) -> xarray.DataArray:
+    """Relative errors that the solver and the discretization leave in every cell."""
+    return dataset["relative_energy_error"].fillna(0.0) + dataset["model_error_estimate"].fillna(0.0)
 
 
 def _outside_wiener(dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray:
@@ -280,7 +285,7 @@ def _outside_wiener(dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray
     known = fraction.fillna(0.0)
     slack: xarray.DataArray | float = ROUNDING
     if medium.pores_conduct:
-        slack = ROUNDING + dataset["relative_energy_error"].fillna(0.0)
+        slack = ROUNDING + _errors(dataset)
     upper = parallel(medium.pores, medium.particles, known) * (1.0 + slack)
     lower = series(medium.pores, medium.particles, known) * (1.0 - slack)
     outside = fraction.isnull() & False

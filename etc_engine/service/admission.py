@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from etc_engine.errors import StudyError
 from etc_engine.packing import parse_radii
+from etc_engine.realization import ENGINES
 from etc_engine.service.settings import Limits
 from etc_engine.study.sweep import Study, parse_study
 
@@ -20,8 +21,8 @@ SOURCE = "study"
 FULL = 1.0
 """A density no packing without a count is expected to exceed."""
 
-BASE_BYTES, PARTICLE_BYTES, VOXEL_BYTES, NODE_BYTES = 250e6, 1600.0, 300.0, 3000.0
-"""Memory of a rank: of its libraries, of a particle, a voxel, a node of a lattice (measured, and rounded upwards)."""
+BASE_BYTES = 250e6
+"""Memory of a rank for its libraries, measured and rounded upwards."""
 
 
 @dataclass(frozen=True)
@@ -114,22 +115,17 @@ def _refuse_excess(found: Application, limits: Limits) -> None:
             raise StudyError(f"{SOURCE}: {field}: makes about {value:.6g} {what}, this service allows {limit}")
     memory, allowed = _expected_memory(found) / 1e6, limits.memory_bytes / 1e6
     if not memory <= allowed:
-        field = "packing.box" if found.study.conduction.engine not in ("voxel", "lattice") else "conduction"
+        field = "packing.box" if ENGINES[found.study.conduction.engine].needs_contacts else "conduction"
         raise StudyError(
             f"{SOURCE}: {field}: takes about {memory:.0f} MB of memory a rank, this service allows {allowed:.0f} MB"
         )
 
 
 def _expected_memory(found: Application) -> float:
-    """Bytes of a rank."""
-    study = found.study
-    packing = BASE_BYTES + PARTICLE_BYTES * found.particles
-    if study.conduction.engine == "lattice":
-        return packing + NODE_BYTES * study.conduction.particles
-    if study.conduction.engine != "voxel":
-        return packing
-    lengths = study.packing.box
-    return packing + VOXEL_BYTES * math.prod(study.conduction.resolution * length / min(lengths) for length in lengths)
+    """Bytes of a rank, the most that one of the methods takes."""
+    study, engine = found.study, ENGINES[found.study.conduction.engine]
+    options = [engine.resolve(one.method, one.options) for one in study.realization_spec(None).conduction]
+    return BASE_BYTES + max(engine.memory(study.packing.box, found.particles, one) for one in options)
 
 
 def field_of(message: str) -> str:

@@ -30,9 +30,9 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     -------
     dict
         ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``: ``values`` of the other dimensions of
-        the sweep, the same in words as ``name``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities.
-        ``models`` with their curves, ``remark`` where there are none,
-        ``bounds_broken``. A number that is not there is None.
+        the sweep, in words too as ``name``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities.
+        ``models`` with their curves, ``remark`` where there are none, ``bounds_broken``. A missing number
+        is None.
     """
     units = int((dataset["worker_rank"].values >= 0).sum())
     found: dict[str, Any] = {"units": units, "confidence": float(dataset.attrs["confidence_level"])}

@@ -5,42 +5,58 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from etc_engine.medium.rules import RULES
 from etc_engine.realization import ENGINES
+from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.schema import StudyTable
 
 Needs = Mapping[str, tuple[str, ...]]
 """The place of a choice, and the words of it with which a key has a meaning."""
 
-NETWORKS = tuple(word for word, engine in ENGINES.items() if not engine.composite)
+NOT_SWEPT = ("dipoles", "threads")
+"""Options of engines that a sweep has no use for: those of a transient, and of the machine."""
 
-MEANING: Mapping[str, Needs] = {
-    "contacts.rule": {"conduction.engine": NETWORKS},
-    "contacts.contact_angle": {"conduction.engine": NETWORKS, "contacts.rule": ("bonded", "coordination")},
-    "contacts.bond_gap": {"conduction.engine": NETWORKS, "contacts.rule": ("bonded",)},
-    "contacts.coordination": {"conduction.engine": NETWORKS, "contacts.rule": ("coordination",)},
-    "contacts.contact_resistance": {"conduction.engine": NETWORKS},
-    "conduction.angle_curve": {"conduction.engine": ("dtem",)},
-    "conduction.resolution": {"conduction.engine": ("voxel",)},
-    "conduction.particles": {"conduction.engine": ("lattice",)},
-    "packing.count": {"packing.method": ("lubachevsky-stillinger", "random-sequential")},
-    "packing.growth_rate": {"packing.method": ("lubachevsky-stillinger",)},
+OPTIONS = {
+    name: option for engine in ENGINES.values() for name, option in engine.options.items() if name not in NOT_SWEPT
 }
-"""The keys that do not always have a meaning."""
+"""Options of all engines, the keys of ``[conduction]``."""
 
 
-def _get(study: StudyTable, place: str) -> Any:
+def _meanings() -> Iterator[tuple[str, Needs]]:
+    networks = {"conduction.engine": tuple(word for word, engine in ENGINES.items() if engine.needs_contacts)}
+    yield "contacts.rule", networks
+    of_rules = {key for rule in RULES.values() for key in rule.keys}
+    for key in (row.key for row in QUANTITIES.values() if row.table == "contacts"):
+        rules = {"contacts.rule": tuple(word for word, rule in RULES.items() if key in rule.keys)}
+        yield f"contacts.{key}", {**networks, **(rules if key in of_rules else {})}
+    for name in OPTIONS:
+        methods = [(e, m) for e, engine in ENGINES.items() for m, row in engine.methods.items() if name in row.options]
+        engines, words = (tuple(dict.fromkeys(column)) for column in zip(*methods, strict=True))
+        yield f"conduction.{name}", {"conduction.engine": engines, "conduction.method": words}
+    yield "packing.count", {"packing.method": ("lubachevsky-stillinger", "random-sequential")}
+    yield "packing.growth_rate", {"packing.method": ("lubachevsky-stillinger",)}
+
+
+MEANING: Mapping[str, Needs] = dict(_meanings())
+"""The keys that do not always have a meaning, by place."""
+
+
+def chosen(study: StudyTable, place: str) -> tuple[str, ...]:
+    """The words of a choice, one or several."""
     found: Any = study
+    if place == "conduction.method":
+        return tuple(found.methods)
     for key in place.split("."):
         found = getattr(found, key)
-    return found
+    return (found,)
 
 
 def meaningless(study: StudyTable) -> Iterator[tuple[str, str]]:
     """Places of the keys without a meaning in this study, and the choice that takes it from them, in words."""
     for place, needs in MEANING.items():
         for choice, words in needs.items():
-            if _get(study, choice) not in words:
-                yield place, f"{choice.rpartition('.')[2]} = {_get(study, choice)!r}"
+            if not set(chosen(study, choice)) & set(words):
+                yield place, f"{choice.rpartition('.')[2]} = {', '.join(map(repr, chosen(study, choice)))}"
                 break
 
 

@@ -11,9 +11,10 @@ from pydantic import Field, model_validator
 from etc_engine.box import Box, parse_periodic
 from etc_engine.engines.voxel.voxelization import check_memory, coarsest_resolution
 from etc_engine.errors import InputError
-from etc_engine.realization import ENGINES, ConductionSpec, RealizationSpec
-from etc_engine.study.files import A_SEED, Seed, StudyFile, parse_toml, read_text, validated
-from etc_engine.study.meaning import drop_meaningless, meaningless, refuse_meaningless
+from etc_engine.medium.rules import RULES
+from etc_engine.realization import ENGINES, Conduction, RealizationSpec
+from etc_engine.study.files import A_SEED, SCHEMA, Seed, StudyFile, parse_toml, read_text, validated
+from etc_engine.study.meaning import MEANING, OPTIONS, drop_meaningless, meaningless, refuse_meaningless
 from etc_engine.study.quantities import QUANTITIES, value_of
 from etc_engine.study.tables import (
     ConductionTable,
@@ -51,13 +52,20 @@ class Study(StudyFile):
 
     @model_validator(mode="after")
     def _check(self) -> Study:
-        word, engine = self.conduction.engine, ENGINES[self.conduction.engine]
-        if len(self.packing.box) not in engine.dimensions:
-            works = " or ".join(f"{dimension}D" for dimension in engine.dimensions)
-            raise ValueError(f"packing.box: engine {word!r} works in {works}, found {list(self.packing.box)}")
+        dimension, engine = len(self.packing.box), ENGINES[self.conduction.engine]
+        for method in self.methods:
+            row = engine.methods[method]
+            if dimension not in row.dimensions:
+                works = " and ".join(f"{d}D" for d in row.dimensions)
+                raise ValueError(
+                    f"packing.box: method {method!r} of engine {engine.name!r} works in {works}, found "
+                    f"{list(self.packing.box)}"
+                )
+            self._check_pores(method, row.pores)
+        if dimension not in RULES[self.contacts.rule].dimensions:
+            raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
         refuse_meaningless(self)
-        self._check_pores()
-        if engine.composite:
+        if not engine.needs_contacts:
             self._check_cell()
         densest = max((density for density in self.densities if density is not None), default=0.0)
         if self.contacts.rule == "bonded" and densest >= 1.0:
@@ -66,15 +74,16 @@ class Study(StudyFile):
             )
         return self
 
-    def _check_pores(self) -> None:
-        """Pores that conduct need an engine that heeds them, and some engines need pores that conduct."""
-        word, values = self.conduction.engine, self.values("pore_conductivity")
-        if ENGINES[word].composite and min(values) <= 0.0:
-            raise ValueError(f"pores.conductivity: found {min(values):g}, engine {word!r} needs pores that conduct")
-        if not ENGINES[word].composite and max(values) > 0.0:
+    def _check_pores(self, method: str, pores: str) -> None:
+        """Refuse pores that conduct with a method that leaves their heat out, and the reverse."""
+        values, which = self.values("pore_conductivity"), f"method {method!r} of engine {self.conduction.engine!r}"
+        if pores == "no" and max(values) > 0.0:
             raise ValueError(
-                f"pores.conductivity: found {max(values):g}, engine {word!r} conducts through contacts alone: allowed "
-                "is 0"
+                f"pores.conductivity: found {max(values):g}, {which} takes no heat through them: allowed is 0"
+            )
+        if pores == "must" and min(values) <= 0.0:
+            raise ValueError(
+                f"pores.conductivity: found {min(values):g}, {which} is only valid with pores that conduct"
             )
 
     def _check_cell(self) -> None:
@@ -113,6 +122,18 @@ class Study(StudyFile):
         measure = min(d for d in self.densities if d is not None) * float(np.prod(packing.box)) / packing.count
         return float((measure / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension))
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The methods as a list, one or many."""
+        method = self.conduction.method
+        if method is None:
+            engine, conduct = ENGINES[self.conduction.engine], max(self.values("pore_conductivity")) > 0.0
+            try:
+                return (engine.default_method(len(self.packing.box), conduct),)
+            except InputError:  # none fits: the checks say what is wrong with the first
+                return (next(iter(engine.methods)),)
+        return (method,) if isinstance(method, str) else method
+
     def values(self, name: str) -> tuple[float, ...]:
         """Values of a quantity, one or several; none where the study does not give any."""
         found = value_of(self, QUANTITIES[name])
@@ -142,7 +163,7 @@ class Study(StudyFile):
     @property
     def shape(self) -> tuple[int, ...]:
         """Cells of a packing: along each axis, and methods."""
-        return (*(len(values) for values in self.axes.values()), len(self.conduction.methods))
+        return (*(len(values) for values in self.axes.values()), len(self.methods))
 
     @property
     def box(self) -> Box:
@@ -156,29 +177,26 @@ class Study(StudyFile):
         It is a study again, the same one.
         """
         values = super().resolved()
-        values["conduction"]["method"] = self.conduction.method or self.conduction.methods[0]
+        values["conduction"]["method"] = self.conduction.method or self.methods[0]
         return drop_meaningless(self, values)
 
     def realization_spec(self, density: float | None) -> RealizationSpec:
         """The specification of one realization at a density of this study (None: the packer's own)."""
-        conduction = self.conduction
-        si = {name: tuple(v * QUANTITIES[name].si for v in values) for name, values in self.quantities.items()}
+        rows, engine = QUANTITIES, ENGINES[self.conduction.engine]
+        si = {name: tuple(value * rows[name].si for value in values) for name, values in self.quantities.items()}
         return RealizationSpec(
-            packing=self.packing.spec(
-                density, radius_growth=self.contacts.rule == "overlap" and not ENGINES[conduction.engine].composite
-            ),
+            packing=self.packing.spec(density, radius_growth=self.contacts.rule == "overlap" and engine.needs_contacts),
             rule=self.contacts.rule,
-            conduction=ConductionSpec(
-                engine=conduction.engine,
-                methods=conduction.methods,
-                tolerance=conduction.tolerance,
-                angle_curve=conduction.angle_curve,
-                resolution=conduction.resolution,
-                particles=conduction.particles,
-            ),
+            conduction=tuple(self._conduction(method) for method in self.methods),
             values={name: values[0] for name, values in si.items() if name not in self.axes},
             axes={name: values for name, values in si.items() if name in self.axes},
         )
+
+    def _conduction(self, method: str) -> Conduction:
+        """How one of the methods conducts, with the options that it heeds."""
+        table, heeded = self.conduction, ENGINES[self.conduction.engine].methods[method].options
+        options = {name: getattr(table, name) for name in OPTIONS if name in heeded}
+        return Conduction(table.engine, method, options, table.tolerance)
 
 
 def read_study(path: Path) -> tuple[Study, str]:
@@ -204,3 +222,39 @@ def parse_study(text: str, source: str = "study") -> Study:
     etc_engine.errors.StudyError: s.toml: name: missing, expected a name ... (and 3 more problems)
     """
     return validated(parse_toml(text, source), Study, source)
+
+
+def study_schema() -> dict[str, Any]:
+    """The JSON schema of a study file, with an example.
+
+    Beside the standard words, a key that only has a meaning with some words of a choice names them in ``x-with``, and
+    the words of a key that depends on another choice stand in ``x-words``.
+
+    Examples
+    --------
+    >>> keys = study_schema()["$defs"]["ContactsTable"]["properties"]
+    >>> keys["coordination"]["x-with"]["contacts.rule"]
+    ['coordination']
+    """
+    found = Study.model_json_schema()
+    tables = {key: node["$ref"].rpartition("/")[2] for key, node in found["properties"].items() if "$ref" in node}
+    for place, needs in MEANING.items():
+        table, key = place.split(".")
+        property_ = found["$defs"][tables[table]]["properties"][key]
+        property_["x-with"] = {choice: list(words) for choice, words in needs.items()}
+    methods = {word: list(engine.methods) for word, engine in ENGINES.items()}
+    found["$defs"][tables["conduction"]]["properties"]["method"]["x-words"] = {"conduction.engine": methods}
+    found["examples"] = [EXAMPLE]
+    return found
+
+
+EXAMPLE = {
+    "schema": SCHEMA,
+    "name": "example",
+    "seed": 20261,
+    "packing": {"radii": "uniform:0.01:0.02", "box": [1.0, 1.0], "density": [0.64, 0.70, 0.76]},
+    "contacts": {"rule": "bonded", "contact_angle": [5.0, 10.0]},
+    "statistics": {"realizations": 20},
+    "models": {"names": ["hashin_shtrikman_upper", "effective_medium", "contact_mean_field"]},
+}
+"""A study that is ready to run."""

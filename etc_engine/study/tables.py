@@ -5,16 +5,19 @@ The physical values of a table come from `etc_engine.study.quantities`, one row 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, create_model, model_validator
 
 from etc_engine.box import Box, parse_periodic
 from etc_engine.errors import InputError
+from etc_engine.medium.rules import RULES
 from etc_engine.models.catalogue import find_model
 from etc_engine.packing import PackingSpec, RadiusDistribution, parse_radii
 from etc_engine.realization import ENGINES
-from etc_engine.study.quantities import QuantityTable, with_quantities
+from etc_engine.realization.options import Option
+from etc_engine.study.meaning import OPTIONS
+from etc_engine.study.quantities import QUANTITIES, QuantityTable, T, with_quantities
 from etc_engine.study.schema import Positive, StudyTable, Word, without_repeats
 
 DEFAULT_CAP = 10
@@ -25,6 +28,32 @@ def _known_engine(word: str) -> str:
     if word not in ENGINES:
         raise ValueError(f"found {word!r}, allowed: {', '.join(ENGINES)}")
     return word
+
+
+def _known_rule(word: str) -> str:
+    if word not in RULES:
+        raise ValueError(f"found {word!r}, allowed: {', '.join(RULES)}")
+    return word
+
+
+def with_options(cls: type[T]) -> type[T]:
+    """Add the options of all engines to the class that reads ``[conduction]``."""
+    fields: dict[str, Any] = {name: _field_of(option) for name, option in OPTIONS.items()}
+    return create_model(cls.__name__, __base__=cls, __module__=cls.__module__, __doc__=cls.__doc__, **fields)
+
+
+def _field_of(option: Option) -> tuple[Any, Any]:
+    def checked(value: Any) -> Any:
+        allowed = "" if value is None else option.check(value)
+        if allowed:
+            raise ValueError(f"found {value!r}, allowed: {allowed}")
+        return value
+
+    kind = {int: "integer", str: "string"}.get(type(option.default))
+    schema = WithJsonSchema({"type": kind} if kind else {})
+    return Annotated[Any, AfterValidator(checked), schema], Field(
+        default=option.default, description=option.description
+    )
 
 
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
@@ -86,19 +115,22 @@ class PackingTable(QuantityTable):
 class ContactsTable(QuantityTable):
     """``[contacts]``: which pairs conduct, and how well."""
 
-    rule: Literal["overlap", "bonded", "coordination"] = Field(
-        default="overlap", description="overlap, bonded or coordination"
+    rule: Annotated[Word, AfterValidator(_known_rule)] = Field(
+        default="overlap", description="the word of a contact rule", json_schema_extra={"enum": list(RULES)}
     )
 
     @model_validator(mode="after")
     def _check(self) -> ContactsTable:
-        if self.rule == "overlap" and self.contact_angle is not None:
-            raise ValueError("contact_angle has no meaning with rule = 'overlap': take it out, or set rule = 'bonded'")
-        if self.rule != "overlap" and self.contact_angle is None:
-            raise ValueError(f"rule = {self.rule!r} needs contact_angle, half-angles in degrees")
-        if (self.rule == "coordination") != (self.coordination is not None):
-            raise ValueError("coordination, the mean number wanted, is only valid with rule = 'coordination'")
+        for key in RULES[self.rule].keys:
+            if getattr(self, key) is None:
+                raise ValueError(f"rule = {self.rule!r} needs {key}, {QUANTITIES[key].allowed}")
         return self
+
+    def values(self) -> dict[str, float]:
+        """The quantities of a study with one value each, in SI units."""
+        rows = [row for row in QUANTITIES.values() if row.table == "contacts"]
+        given = {row.key: (getattr(self, row.key), row.si) for row in rows}
+        return {key: value * si for key, (value, si) in given.items() if value is not None}
 
 
 @with_quantities("particles.mixture")
@@ -125,36 +157,25 @@ class RadiationTable(QuantityTable):
     """``[radiation]``: between the surfaces of the particles."""
 
 
+@with_options
 @with_quantities("conduction")
 class ConductionTable(QuantityTable):
     """``[conduction]``: how the heat conduction is solved."""
 
-    engine: Engine = Field(default="dtem", description="the word of an engine")
+    engine: Engine = Field(
+        default="dtem", description="the word of an engine", json_schema_extra={"enum": list(ENGINES)}
+    )
     method: Word | Annotated[tuple[Word, ...], AfterValidator(without_repeats), Field(min_length=1)] | None = Field(
-        default=None, description="a method of the engine, or a list of different ones"
+        default=None, description="a method of the engine, or a list of different ones; the first that fits by default"
     )
     tolerance: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] = Field(
         default=1e-10, description="a relative error of the conductivity, between 0 and 1"
     )
-    angle_curve: Literal["reduced", "full"] = Field(default="reduced", description="reduced or full")
-    resolution: Annotated[int, Field(strict=True, ge=4, le=10**5)] = Field(
-        default=64, description="a whole number of at least 4: voxels along the shortest edge of the box"
-    )
-    particles: Annotated[int, Field(strict=True, ge=100, le=10**8)] = Field(
-        default=10_000, description="a whole number of at least 100, of the lattice"
-    )
-
-    @property
-    def methods(self) -> tuple[str, ...]:
-        """The methods as a list, one or many."""
-        if self.method is None:
-            return ENGINES[self.engine].methods[:1]
-        return (self.method,) if isinstance(self.method, str) else self.method
 
     @model_validator(mode="after")
     def _check(self) -> ConductionTable:
         allowed = ENGINES[self.engine].methods
-        for method in self.methods:
+        for method in (self.method,) if isinstance(self.method, str) else self.method or ():
             if method not in allowed:
                 raise ValueError(f"method: found {method!r}, allowed with {self.engine}: {', '.join(allowed)}")
         return self

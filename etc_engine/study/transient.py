@@ -82,13 +82,15 @@ class Conduction(StudyTable):
         allowed = TRANSIENT[self.engine]
         if self.method not in allowed:
             raise ValueError(f"method: found {self.method!r}, allowed with {self.engine}: {', '.join(allowed)}")
-        if self.engine == "pipe" and self.dipoles:
-            raise ValueError("dipoles have no meaning with engine = 'pipe': a particle has one temperature")
+        if self.dipoles and "dipoles" not in ENGINES[self.engine].methods[self.method].options:
+            raise ValueError(f"dipoles have no meaning with engine = {self.engine!r}: a particle has one temperature")
         return self
 
 
-TRANSIENT = {word: [m for m in ENGINES[word].methods if m != "exact"] for word in ("dtem", "pipe")}
-"""Methods that march, by engine."""
+TRANSIENT = {
+    word: found for word, row in ENGINES.items() if (found := [name for name, m in row.methods.items() if m.transient])
+}
+"""Methods with a transient form, by engine."""
 
 
 class Gradient(StudyTable):

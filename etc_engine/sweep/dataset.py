@@ -67,7 +67,7 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
-    if "exact" in study.conduction.methods:
+    if "exact" in study.methods:
         meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
         dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
@@ -94,7 +94,7 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
         comment += "; the packer's own, mean over realizations"
     found: dict[str, Any] = {
         "density": ("density", np.array(density), {"long_name": "density", "units": "1", "comment": comment}),
-        "method": ("method", np.array(study.conduction.methods, dtype=object), {"long_name": "method"}),
+        "method": ("method", np.array(study.methods, dtype=object), {"long_name": "method"}),
         "realization": ("realization", np.arange(study.statistics.cap), {"long_name": "realization", "units": "1"}),
         "direction_i": ("direction_i", axes, {"long_name": "direction of the flux"}),
         "direction_j": ("direction_j", axes, {"long_name": "direction of the gradient"}),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from etc_engine.errors import OutputError
-from etc_engine.realization import Cell, Realization, RealizationSpec, Status
+from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
 from etc_engine.sweep.plan import Unit
 
 
@@ -38,7 +38,7 @@ class Record:
 def failed_realization(error: Exception, spec: RealizationSpec) -> Realization:
     """The result of a unit that raised: every cell has status ERROR and says why."""
     message = _steady(f"{type(error).__name__}: {error}")
-    cells = (Cell(Status.ERROR, message),) * math.prod(spec.shape)
+    cells = (Outcome(Status.ERROR, message),) * math.prod(spec.shape)
     return Realization(0, np.nan, np.nan, 0.0, cells)
 
 
@@ -65,7 +65,7 @@ def decode(line: str) -> Record:
 
     Examples
     --------
-    >>> cell = Cell(Status.OK, conductivity=np.array([[0.1 + 0.2, np.nan], [np.nan, 1.0]]))
+    >>> cell = Outcome(Status.OK, conductivity=np.array([[0.1 + 0.2, np.nan], [np.nan, 1.0]]))
     >>> record = Record(Unit(0.7, 3), Realization(9, 0.7, 0.7, 0.1, (cell,)), 0, "node", 1.0, 2.0)
     >>> decode(encode(record)).result.cells[0].conductivity[0, 0] == 0.1 + 0.2
     np.True_
@@ -87,16 +87,18 @@ def _flat(cells: list[Any]) -> list[dict[str, Any]]:
     return [inner for cell in cells for inner in (cell if isinstance(cell, list) else [cell])]
 
 
-def _plain_cell(cell: Cell) -> dict[str, Any]:
-    values = {field.name: getattr(cell, field.name) for field in fields(Cell)}
+def _plain_cell(cell: Outcome) -> dict[str, Any]:
+    values = {field.name: getattr(cell, field.name) for field in fields(Outcome)}
     values["status"] = int(cell.status)
-    values["conductivity"] = np.asarray(cell.conductivity, dtype=np.float64).tolist()
+    if cell.conductivity is not None:
+        values["conductivity"] = np.asarray(cell.conductivity, dtype=np.float64).tolist()
     return values
 
 
-def _cell(values: dict[str, Any]) -> Cell:
-    status, conductivity = Status(values.pop("status")), np.array(values.pop("conductivity"), dtype=np.float64)
-    return Cell(status=status, conductivity=conductivity, **values)
+def _cell(values: dict[str, Any]) -> Outcome:
+    status, tensor = Status(values.pop("status")), values.pop("conductivity")
+    conductivity = None if tensor is None else np.array(tensor, dtype=np.float64)
+    return Outcome(status=status, conductivity=conductivity, **values)
 
 
 def _plain_scalar(value: object) -> object:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.realization import Cell, Status
+from etc_engine.realization import Outcome, Status
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.plan import stream_fingerprint
 from etc_engine.sweep.records import Record
@@ -42,7 +42,7 @@ CELL_VARIABLES = {
     "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
     "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
     "model_error_estimate": Variable(
-        np.float64, np.nan, "estimated relative error of the method: chord, if solved in full, and exact"
+        np.float64, np.nan, "estimated relative error of the method: chord if solved in full, exact, voxel and lattice"
     ),
     "mean_field_conductivity": Variable(
         np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
@@ -139,7 +139,7 @@ def tabulate(study: Study, records: Iterable[Record]) -> Table:
     return join([Table(rows, messages)])
 
 
-def _known(cell: Cell, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _known(cell: Outcome, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """The values of a cell that has any; a failed one has none, whatever it stands for them."""
     if values is None or cell.status > Status.NOT_PERCOLATING:
         return np.full(shape, np.nan)

@@ -13,14 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.box import Box, parse_periodic
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
+from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
-from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import value_at
 from etc_engine.packing import ParticlePacking, pack
 from etc_engine.particle_files.dumps import read_trajectory
 from etc_engine.particle_files.formats import format_to_read, read_particles
 from etc_engine.particle_files.trajectory import Trajectory
-from etc_engine.realization.transients import SYSTEMS, ParticleSystem, Physics, storing_area
+from etc_engine.realization import transient_system
+from etc_engine.realization.media import contact_network
 from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
 from etc_engine.study.transient import FileTable, Gradient, NetworkStudy, refuse_endless
@@ -140,7 +142,7 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
     """One packing, marched over the output times."""
     packing, column = _particles(study, folder)
     network = _contacts(study, packing)
-    system = SYSTEMS[_method(study)](network, _physics(study, packing.count, column))
+    system = _physics(study, packing.count, column).system(network)
     initial = system.initial(_initial(study, packing))
     time = study.time
 
@@ -167,7 +169,6 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     motion, time, file = study.motion, study.time, study.packing
     assert motion is not None
     assert isinstance(file, FileTable)
-    method = _method(study)
     path = folder / file.files
     if not path.exists():
         raise StudyError(f"packing.files: there is no file {path}")
@@ -179,10 +180,6 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         raise StudyError(f"packing.files: expected disks in a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
 
-    def build(network: ContactNetwork, capacities: NDArray[np.float64]) -> ParticleSystem:
-        heat_capacity = capacities / storing_area(network, method, physics)
-        return SYSTEMS[method](network, replace(physics, heat_capacity=heat_capacity))
-
     def contacts(packing: ParticlePacking) -> ContactNetwork:
         return _contacts(study, packing)
 
@@ -191,9 +188,9 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         return march_trajectory(
             trajectory,
             contacts,
-            build,
+            physics.system,
             _initial(study, first),
-            heat_capacity=physics.heat_capacity,
+            heat_capacity=np.asarray(study.particles.heat_capacity, dtype=np.float64),
             expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
             scheme=time.scheme,
             steps=time.steps or 1,
@@ -205,28 +202,39 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     refuse_endless(time, trajectory.times)
     with named_frame(trajectory, 0):
         network = contacts(first)
-        system = SYSTEMS[method](network, physics)
+        system = physics.system(network)
     return _Course(network, system, trajectory.times, marched, MovingState, trajectory)
 
 
-def _method(study: NetworkStudy) -> str:
-    """The word of `SYSTEMS`."""
-    return "pipe" if study.conduction.engine == "pipe" else study.conduction.method
+@dataclass(frozen=True, eq=False)
+class _Physics:
+    """What a study says about the particles, besides their contacts, and the system that follows."""
+
+    study: NetworkStudy
+    conductivity: ArrayLike
+    source: Callable[[float], NDArray[np.float64]]
+
+    def system(self, network: ContactNetwork, capacities: NDArray[np.float64] | None = None) -> ParticleSystem:
+        """The system of a contact network, with given heat capacities of the particles or the study's."""
+        conduction = self.study.conduction
+        heat_capacity = np.asarray(self.study.particles.heat_capacity, dtype=np.float64)
+        medium = Medium(network.packing, np.asarray(self.conductivity), network, heat_capacity=heat_capacity)
+        return transient_system(
+            medium,
+            self.study.walls.conditions(),
+            engine=conduction.engine,
+            method=conduction.method,
+            source=self.source,
+            capacities=capacities,
+            **({"dipoles": True} if conduction.dipoles else {}),
+        )
 
 
-def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> Physics:
+def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> _Physics:
     particles = study.particles
     if column is not None and "conductivity" in particles.model_fields_set:
         raise StudyError("particles.conductivity: the particle file has a column of that name, take one of them out")
-    return Physics(
-        conductivity=particles.conductivity if column is None else column,
-        heat_capacity=np.asarray(particles.heat_capacity, dtype=np.float64),
-        contact_resistance=study.contacts.contact_resistance,
-        walls=study.walls.conditions(),
-        source=_source(study, count),
-        pipe_resistance=study.conduction.method if study.conduction.engine == "pipe" else "chord",
-        dipoles=study.conduction.dipoles,
-    )
+    return _Physics(study, particles.conductivity if column is None else column, _source(study, count))
 
 
 def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
@@ -261,13 +269,7 @@ def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDAr
 
 
 def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
-    words = study.contacts
-    if words.rule == "overlap":
-        return overlap_contacts(packing)
-    half_angle = float(np.radians(words.contact_angle))
-    if words.rule == "coordination":
-        return coordination_contacts(packing, half_angle, words.coordination)
-    return bonded_contacts(packing, half_angle, words.bond_gap)
+    return contact_network(packing, study.contacts.rule, study.contacts.values())
 
 
 def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.float64]]:

@@ -61,7 +61,7 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
         for f, value, width, t, lo, hi in zip(x, mean, half, third, low, high, strict=True):
             total += 1
             inside += lo <= value <= hi
-            error = float(data["relative_energy_error"].sel(particle_conductivity=contrast, density=f).mean())
+            error = float(data["model_error_estimate"].sel(particle_conductivity=contrast, density=f).mean())
             print(
                 f"{d}D {contrast:6g} {f:5.2f} {value:9.5f} +- {width:.5f}  third order {t:9.5f} "
                 f"({100.0 * (value / t - 1.0):+6.2f} %)  bounds {lo:.5f} {hi:.5f}  "

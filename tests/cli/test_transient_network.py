@@ -17,6 +17,7 @@ import pytest
 import xarray
 
 from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.medium.medium import medium_of
 from etc_engine.output.figures.transient import draw_transient, pick_times
 from etc_engine.output.series import series_dataset
 from etc_engine.solvers.marching import SCHEMES
@@ -99,7 +100,7 @@ def test_late_heat_flow_is_the_steady_conductivity(tmp_path):
     content["source"] = []
     done = run_transient(parse_study(content), tmp_path)
     last = done.states[-1]
-    steady = pipe_conductivity(done.network, contact_resistance=0.1, axes=(0,)).tensor[0, 0]
+    steady = pipe_conductivity(medium_of(done.network.with_resistance(0.1)), axes=(0,)).tensor[0, 0]
     assert done.system.heat.rates(last.time, last.temperatures)[0] == pytest.approx(steady, rel=1e-8)
 
 

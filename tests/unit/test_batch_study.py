@@ -32,7 +32,7 @@ def test_defaults_and_order():
     study = parse_study(STUDY)
     assert study.densities == (0.65, 0.75)
     assert study.axes == {"contact_angle": (2.5, 10.0)}
-    assert study.conduction.methods == ("chord",)
+    assert study.methods == ("chord",)
     assert study.statistics.cap == 3
     assert study.statistics.confidence == 0.95
     assert study.packing.method == "advancing-front"
@@ -46,7 +46,7 @@ def test_conversion_to_a_realization():
     assert spec.axes == {"contact_angle": (math.radians(2.5), math.radians(10.0))}
     assert spec.values["particle_conductivity"] == 1.0
     assert spec.shape == (2, 1)
-    assert spec.conduction.methods == ("chord",)
+    assert [one.method for one in spec.conduction] == ["chord"]
 
 
 def test_one_number_stands_for_a_list_of_one():
@@ -72,7 +72,7 @@ def test_without_density_the_packer_decides():
         ("[10.0, 2.5]", "[90]", ("contacts.contact_angle[0]", "found 90", "between 0 and 90")),
         ("contact_angle = [10.0, 2.5]", "", ("contacts", "bonded", "contact_angle")),
         ('"bonded"', '"overlap"', ("contacts", "contact_angle", "overlap")),
-        ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded or coordination")),
+        ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded, coordination")),
         ("[statistics]", '[conduction]\nmethod = "cord"\n[statistics]', ("method", "found 'cord'", "chord")),
         (
             "[statistics]",

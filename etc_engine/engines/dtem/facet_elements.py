@@ -29,7 +29,7 @@ from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.rings import FacingSpheres, condense_pairs, legendre_means
 from etc_engine.medium.facets import FacetLinks
 
-TERMS = 100
+TERMS = 64
 """Legendre terms between two facets, L."""
 
 

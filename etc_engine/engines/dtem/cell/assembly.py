@@ -84,7 +84,7 @@ def assemble_cells(
         (cells.starts, cells.edges, cells.forward),
         edges,
         grid,
-        (frame.starts, frame.unknowns, frame.positions, frame.degrees),
+        (frame.starts, frame.unknowns, frame.positions, frame.degrees, frame.storing),
         materials,
         work,
         (indptr, indices, data, loads, energy),
@@ -112,11 +112,11 @@ def _pattern(frame: Frame, count: int) -> tuple[NDArray[np.int32], NDArray[np.in
 
 @njit(cache=True)
 def _assemble(cells, edges, grid, frame, materials, work, system):  # type: ignore[no-untyped-def]
-    starts, unknowns, positions, degrees = frame
+    starts, unknowns, positions, degrees, storing = frame
     indptr, indices, data, loads, energy = system
     matrix = work[2]
     for i in range(cells[0].size - 1):
-        _, inner, size = reduce_cell(i, cells, edges, grid, degrees, materials, work)
+        _, inner, size = reduce_cell(i, cells, edges, grid, degrees, storing, materials, work)
         mine = unknowns[starts[i] : starts[i + 1]]
         places = positions[starts[i] : starts[i + 1]]
         for a in range(inner, size):

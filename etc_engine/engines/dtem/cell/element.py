@@ -116,7 +116,7 @@ def number_unknowns(count, edges, rim, numbers):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _interval(c, following, i, edges, rim, materials, local):  # type: ignore[no-untyped-def]
+def strip_of(c, following, i, edges, rim, materials, local):  # type: ignore[no-untyped-def]
     """Strip matrix of the interval after node c, the resistance of a contact in it; returns the coefficients used."""
     _, sides, edge_of, forward, sigmas, owns, _ = rim
     radii, solid, fluid = materials
@@ -165,8 +165,8 @@ def _interval(c, following, i, edges, rim, materials, local):  # type: ignore[no
 
 
 @njit(cache=True)
-def reduce_cell(i, cells, edges, grid, degrees, materials, work):  # type: ignore[no-untyped-def]
-    """Eliminate the inner unknowns of cell i.
+def reduce_cell(i, cells, edges, grid, degrees, storing, materials, work):  # type: ignore[no-untyped-def]
+    """Eliminate the inner unknowns of cell i; a cell that is ``storing`` heat keeps the disk's mean as its last one.
 
     Returns (rim nodes, inner dense unknowns, size). In ``work`` are left: the reduced dense matrix, whose block
     [inner:size, inner:size] is K (upper triangle), and T^-1 times the coupling of the bumps m to the dense unknowns.
@@ -182,9 +182,12 @@ def reduce_cell(i, cells, edges, grid, degrees, materials, work):  # type: ignor
         for k in range(degrees[rim[2][side]] - 1):
             columns[side, 2 + k] = size
             size += 1
+    size += 1 if storing else 0
     matrix[:size, :size] = 0.0
     coupling[:count, :size] = 0.0
     _add_disk(count, size, rim, columns, degrees, numbers[0], materials[1][i], matrix, first, second)
+    if storing:
+        _add_store(count, size, rim, columns, degrees, numbers[0], materials[1][i], matrix)
     diagonal, beside = np.zeros(count), np.zeros(count)
     places = (
         np.zeros((FIELDS, HIGHEST + 1), np.int64),
@@ -193,7 +196,7 @@ def reduce_cell(i, cells, edges, grid, degrees, materials, work):  # type: ignor
     )
     for c in range(count):
         d = c + 1 if c + 1 < count else 0
-        fields = _interval(c, d, i, edges, rim, materials, local)
+        fields = strip_of(c, d, i, edges, rim, materials, local)
         _spread(c, d, rim, numbers, columns, degrees, places)
         diagonal[c] += local[1, 1]
         diagonal[d] += local[3, 3]
@@ -280,6 +283,31 @@ def _add_disk(count, size, rim, columns, degrees, of_rim, solid, matrix, first, 
                 row = columns[sides[i], k]
                 for q in range(row, size):
                     matrix[row, q] += weight * product[i, q - begin]
+
+
+@njit(cache=True)
+def _add_store(count, size, rim, columns, degrees, of_rim, solid, matrix):  # type: ignore[no-untyped-def]
+    """Add 8 pi k (mean of the rim - mean of the disk)^2, the energy of heat stored evenly over a disk.
+
+    A disk whose every part warms at one rate has T = harmonic part + rate (r^2 - R^2)/(4 a), so that its mean lags
+    behind that of the rim by Q/(8 pi k) for a heat flow Q into it.
+    """
+    angles, sides, weights = rim[0], rim[1], rim[6]
+    share = np.zeros(size)
+    for c in range(count):
+        before = angles[c - 1] if c > 0 else angles[count - 1] - 2.0 * math.pi
+        after = angles[c + 1] if c < count - 1 else angles[0] + 2.0 * math.pi
+        part = (after - before) / (4.0 * math.pi)
+        if of_rim[c] >= 0:
+            share[of_rim[c]] += part
+        for k in range(degrees[rim[2][sides[c]]] + 1):
+            share[columns[sides[c], k]] += part * weights[c, k]
+    share[size - 1] = -1.0
+    for a in range(size):
+        value = 8.0 * math.pi * solid * share[a]
+        if value != 0.0:
+            for b in range(a, size):
+                matrix[a, b] += value * share[b]
 
 
 def workspace(nodes: int, sides: int, frame: int) -> tuple:

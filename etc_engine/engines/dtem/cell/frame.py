@@ -78,6 +78,8 @@ class Frame:
         counter-clockwise.
     positions : ndarray, shape (., 2) [m]
         Where they are, seen from the centre of the disk.
+    storing : bool
+        Whether every cell ends with the mean temperature of its disk, which is needed where disks store heat.
     """
 
     degrees: Ints
@@ -85,11 +87,12 @@ class Frame:
     starts: Ints
     unknowns: Ints
     positions: Floats
+    storing: bool = False
 
     @property
     def count(self) -> int:
-        """Number of unknowns."""
-        return int(self.first[-1])
+        """Number of unknowns; the means of storing disks come last."""
+        return int(self.first[-1]) + (self.starts.size - 1 if self.storing else 0)
 
 
 def edge_degrees(lengths: Floats, smaller: Floats, degree: int) -> Ints:
@@ -104,16 +107,16 @@ def edge_degrees(lengths: Floats, smaller: Floats, degree: int) -> Ints:
     return np.minimum(degree + longer, HIGHEST).astype(np.int64)
 
 
-def build_frame(cells: LaguerreCells, degrees: Ints) -> Frame:
+def build_frame(cells: LaguerreCells, degrees: Ints, *, storing: bool = False) -> Frame:
     """Unknowns of the frames of Laguerre cells, for edges of given degrees."""
     sides = np.diff(cells.starts)
     owner = np.repeat(np.arange(sides.size), sides)
     inner = degrees[cells.edges] - 1
     before = np.concatenate(([0], np.cumsum(inner)))
-    starts = np.concatenate(([0], np.cumsum(sides))) + before[cells.starts]
+    starts = np.concatenate(([0], np.cumsum(sides + storing))) + before[cells.starts]
     rows = np.arange(cells.edges.size)
     unknowns = np.empty(starts[-1], dtype=np.int64)
-    positions = np.empty((starts[-1], 2))
+    positions = np.zeros((starts[-1], 2))
     at = starts[owner] + rows - cells.starts[owner]
     unknowns[at], positions[at] = cells.vertices, cells.corners
     following = rows + 1
@@ -126,4 +129,6 @@ def build_frame(cells: LaguerreCells, degrees: Ints) -> Frame:
         unknowns[at] = first[cells.edges[has]] + node
         share = 0.5 * (_LOBATTO[inner[has] + 1, k + 1] + 1.0)[:, None]
         positions[at] = cells.corners[has] + share * (cells.corners[following[has]] - cells.corners[has])
-    return Frame(degrees, first, starts, unknowns, positions)
+    if storing:
+        unknowns[starts[1:] - 1] = first[-1] + np.arange(sides.size)
+    return Frame(degrees, first, starts, unknowns, positions, storing)

@@ -26,12 +26,14 @@ class CellGeometry:
 
     Parameters
     ----------
+    centers : ndarray, shape (n, 2) [m]
     radii : ndarray, shape (n,) [m]
     box : Box
     cells : LaguerreCells
     edges : CellEdges
     """
 
+    centers: Floats
     radii: Floats
     box: Box
     cells: LaguerreCells
@@ -96,10 +98,12 @@ def cell_geometry(
     GeometryError
     """
     cells = cells or laguerre_cells(centers, radii, box)
-    return CellGeometry(radii, box, cells, cell_edges(cells, radii, contacts))
+    return CellGeometry(centers, radii, box, cells, cell_edges(cells, radii, contacts))
 
 
-def divide(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution) -> tuple[EdgeGrid, Frame]:
+def divide(
+    geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution, *, storing: bool = False
+) -> tuple[EdgeGrid, Frame]:
     """Rim grids for conductivities ``solid`` of the disks and ``fluid`` between them, and the unknowns."""
     pairs = geometry.cells.cells
     other = np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
@@ -107,4 +111,4 @@ def divide(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Reso
     edges = geometry.edges
     degrees = edge_degrees(edges.ends[:, 1] - edges.ends[:, 0], edges.smaller, resolution.degree)
     grid = grid_edges(edges, ratio, degrees, corner=resolution.corner, longest=resolution.longest)
-    return grid, build_frame(geometry.cells, degrees)
+    return grid, build_frame(geometry.cells, degrees, storing=storing)

@@ -75,7 +75,14 @@ class CellSolution:
         return float(reactions[low].sum()), -float(reactions[far].sum())
 
 
-def build_model(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution | None = None) -> CellModel:
+def build_model(
+    geometry: CellGeometry,
+    solid: Floats,
+    fluid: float,
+    resolution: Resolution | None = None,
+    *,
+    storing: bool = False,
+) -> CellModel:
     """Reduce and assemble the cells for one set of conductivities.
 
     Parameters
@@ -84,13 +91,15 @@ def build_model(geometry: CellGeometry, solid: Floats, fluid: float, resolution:
     solid : ndarray, shape (n,) [W/(m K)]
     fluid : float [W/(m K)]
     resolution : Resolution, optional
+    storing : bool
+        Whether the mean temperatures of the disks are unknowns too.
 
     Returns
     -------
     CellModel
     """
     resolution = resolution or Resolution()
-    grid, frame = divide(geometry, solid, fluid, resolution)
+    grid, frame = divide(geometry, solid, fluid, resolution, storing=storing)
     materials = CellMaterials(geometry.radii, np.ascontiguousarray(solid, np.float64), float(fluid))
     system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials)
     return CellModel(geometry, materials, grid, frame, system)
