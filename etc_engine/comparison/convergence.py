@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from etc_engine.comparison.simulation import mean_diagonal, simulated, study_of
+from etc_engine.comparison.simulation import current_study, mean_diagonal, simulated
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
 from etc_engine.sweep.statistics import student_t
@@ -102,7 +102,7 @@ def system_sizes(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
 
 
 def _comparable(dataset: xarray.Dataset) -> dict[str, object]:
-    study = study_of(dataset)
+    study = current_study(dataset)
     packing = {key: value for key, value in study["packing"].items() if key not in ("box", "count", "radii")}
     return {
         **{f"packing.{key}": value for key, value in packing.items()},

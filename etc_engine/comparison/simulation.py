@@ -62,6 +62,18 @@ def study_of(dataset: xarray.Dataset) -> dict[str, Any]:
         study: dict[str, Any] = json.loads(dataset.attrs["study_resolved"])
     except ValueError as error:
         raise InputError(f"the attribute study_resolved is not valid JSON ({error}): the file is damaged") from None
+    return study
+
+
+def current_study(dataset: xarray.Dataset) -> dict[str, Any]:
+    """The study behind the result of a sweep, in the form of today.
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the result of a sweep, or is of an older version of the engine.
+    """
+    study = study_of(dataset)
     if study.get("schema") != SCHEMA:
         raise InputError(
             f"this result is of a study of schema {study.get('schema')}, from an older version of the engine: "
@@ -78,7 +90,7 @@ def phases(dataset: xarray.Dataset) -> Phases:
     InputError
         If the dataset is not the result of a sweep, or its particles are of two materials.
     """
-    study = study_of(dataset)
+    study = current_study(dataset)
     pores, particles = dataset["pore_conductivity"], dataset["particle_conductivity"]
     if "mixture_conductivity" in dataset.coords:
         other = dataset["mixture_conductivity"]

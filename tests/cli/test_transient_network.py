@@ -261,7 +261,7 @@ def test_times_of_a_picture_share_the_way_evenly():
         ("steps = 4", "steps = 4\ntolerance = 1e-3", "tolerance: has no meaning with scheme"),
         ('scheme = "bdf2"', 'scheme = "heun"', "found 'heun', allowed: explicit-euler"),
         ("heat_capacity = 2.0", "heat_capacity = -2.0", "particles.heat_capacity"),
-        ("heat_capacity = 2.0", "heat_capacity = [1.0, 2.0]", "the heat capacity must be one finite number"),
+        ("heat_capacity = 2.0", "heat_capacity = [1.0, 2.0]", "the heat capacity must be one number or an array"),
         ("seed = 7", "", "seed: [packing] draws random numbers"),
         ('radii = "uniform:0.03:0.05"', 'files = "none.csv"\nradii = "equal:0.1"', "packing.radii: unknown key"),
         ('type = "fixed", value = 1.0', 'type = "fixed"', "walls.left: value: missing, type = 'fixed' needs one"),
