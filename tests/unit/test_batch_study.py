@@ -100,7 +100,6 @@ def test_without_density_the_packer_decides():
         ("seed = 20261", "seed = -1", ("seed", "found -1", "from 0")),
         ("schema = 2", "schema = 3", ("schema", "found 3", "allowed: 2")),
         ("box = [1.0, 1.0]", "box = [1.0]", ("packing.box", "two or three")),
-        ("box = [1.0, 1.0]", "box = [1.0, 1.0, 1.0]", ("packing.box", "2D")),
         ("box =", 'periodic = "xq"\nbox =', ("periodic", "'xq'")),
         ("uniform:0.01:0.02", "triangle:0.01", ("packing", "radii", "triangle:0.01")),
         ("box =", "growth_rate = 0.1\nbox =", ("packing", "growth_rate", "advancing-front")),
