@@ -44,8 +44,8 @@ def grey_exchange(temperature: float, emissivity_1: ArrayLike, emissivity_2: Arr
 
     Examples
     --------
-    >>> grey_exchange(1000.0, 1.0, 1.0).round(3), grey_exchange(1000.0, 0.0, 1.0)
-    (np.float64(226.815), np.float64(0.0))
+    >>> grey_exchange(1000.0, [1.0, 0.0], 1.0).round(3)
+    array([226.815,   0.   ])
     """
     if not (np.isfinite(temperature) and temperature > 0.0):
         raise InputError(f"radiation needs a positive absolute temperature [K], found {temperature:g}")

@@ -67,6 +67,38 @@ class FacetLinks:
         return centers[self.pairs[:, 1]] - centers[self.pairs[:, 0]] + self.shifts * lengths
 
     @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """Distance of the two centres, and of the centre from the wall, shape (m + w,) [m]."""
+        return np.concatenate([np.linalg.norm(self.branches, axis=1), self.wall_distances])
+
+    @cached_property
+    def smaller_radii(self) -> NDArray[np.float64]:
+        """Radius of the smaller sphere of each link, shape (m + w,) [m]."""
+        radii = self.packing.radii
+        return np.concatenate([radii[self.pairs].min(axis=1, initial=np.inf), radii[self.wall_particles]])
+
+    @cached_property
+    def overlap_of_caps(self) -> NDArray[np.float64]:
+        r"""S = sum_j n_j n_j^T (1 - cos^3 psi_j)/2 of every sphere, shape (n, 3, 3).
+
+        The caps have the areas of the facets, seen along the line of centres. If they tiled the sphere, S would be I.
+        Walls of all kinds count.
+        """
+        m, radii = self.count, self.packing.radii
+        normals = self.branches / self.lengths[:m, None]
+        owner = np.concatenate([self.pairs[:, 0], self.pairs[:, 1], self.wall_particles])
+        normals = np.concatenate([normals, -normals, self.wall_normals])
+        rho = np.minimum(np.sqrt(np.concatenate([self.areas, self.wall_areas]) / np.pi), self.smaller_radii)
+        sine = np.minimum(np.concatenate([rho[:m], rho]) / radii[owner], 1.0)
+        weight = 0.5 * (1.0 - (1.0 - sine**2) ** 1.5)
+        overlap = np.empty((radii.size, 3, 3))
+        for a in range(3):
+            for b in range(a + 1):
+                overlap[:, a, b] = np.bincount(owner, weight * normals[:, a] * normals[:, b], minlength=radii.size)
+                overlap[:, b, a] = overlap[:, a, b]
+        return overlap
+
+    @cached_property
     def wall_normals(self) -> NDArray[np.float64]:
         """Unit vectors from the sphere to its wall, shape (w, 3)."""
         normals = np.zeros((self.walls.size, 3))

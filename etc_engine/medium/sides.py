@@ -15,22 +15,22 @@ from etc_engine.medium.network import ContactNetwork
 
 @dataclass(frozen=True, eq=False)
 class InsulatedCuts:
-    """Chords at which insulated walls cut disks.
+    """Contacts at which insulated walls cut particles.
 
     Parameters
     ----------
     particles : ndarray of int, shape (c,)
     walls : ndarray of int, shape (c,)
         Row of the cut among the wall contacts of the network.
-    directions : ndarray, shape (c, d)
-        Outward normals of the walls.
+    arms : ndarray, shape (c, d)
+        Unit direction of each cut.
     alpha : ndarray, shape (c,) [rad]
-        Half-angle of each cut.
+        Its half-angle.
     """
 
     particles: NDArray[np.int64]
     walls: NDArray[np.int64]
-    directions: NDArray[np.float64]
+    arms: NDArray[np.float64]
     alpha: NDArray[np.float64]
 
 
@@ -100,18 +100,17 @@ def insulated_cuts(network: ContactNetwork, driven: NDArray[np.bool_]) -> Insula
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional.
     driven : ndarray of bool, shape (w,)
     """
     if not network.geometric:
         return NO_CUTS
     rows = np.flatnonzero(~driven)
-    normals = wall_normals(network.walls[rows], network.packing.dimension)
-    return InsulatedCuts(network.wall_particles[rows], rows, normals, network.wall_angles[rows])
+    arms = wall_normals(network.walls[rows], network.packing.dimension)
+    return InsulatedCuts(network.wall_particles[rows], rows, arms, network.wall_angles[rows])
 
 
 def wall_normals(walls: NDArray[np.int64], dimension: int) -> NDArray[np.float64]:
-    """Outward unit normal of each wall, shape (w, d)."""
+    """Outward unit normals of walls, shape (w, d)."""
     normals = np.zeros((walls.size, dimension))
     normals[np.arange(walls.size), walls // 2] = 2.0 * (walls % 2) - 1.0
     return normals

@@ -11,7 +11,7 @@ import numpy as np
 from etc_engine.box import AXES
 from etc_engine.engines.dtem import conductivity as dtem
 from etc_engine.engines.dtem.field import recover_field
-from etc_engine.engines.dtem.methods import METHODS as DTEM_METHODS
+from etc_engine.engines.dtem.methods import dimensions_of
 from etc_engine.engines.dtem.transient import element_system
 from etc_engine.engines.lattice import homogenize as lattice
 from etc_engine.engines.pipe import steady as pipe
@@ -230,8 +230,7 @@ def _lattice_memory(_: Sequence[float], particles: float, options: Mapping[str, 
 
 def _elements(name: str, description: str, *options: str) -> Method:
     """A method of thermal elements with a transient form."""
-    dimensions = DTEM_METHODS[name].dimensions
-    return Method(description, dimensions, transient=True, options=("angle_curve", "dipoles", *options))
+    return Method(description, dimensions_of(name), transient=True, options=("angle_curve", "dipoles", *options))
 
 
 def _grid(description: str) -> Method:
@@ -256,7 +255,11 @@ ENGINES: Mapping[str, Engine] = {
                 "standard": _elements("standard", "uniform flux over the contact arcs (Feng et al. 2008)"),
                 "enhanced": _elements("enhanced", "uniform flux with a tabulated correction (Feng et al. 2008)"),
                 "arc": _elements("arc", "flux over the contact arcs in modes", "modes"),
-                "exact": Method("disks cut by their contacts, with two-sided bounds", (2,), options=("modes",)),
+                "exact": Method(
+                    "particles cut by their contacts; of disks with two-sided bounds",
+                    dimensions_of("exact"),
+                    options=("modes",),
+                ),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
             {"modes": MODES, "angle_curve": ANGLE_CURVE, "dipoles": DIPOLES},

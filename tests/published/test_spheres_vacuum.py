@@ -63,6 +63,31 @@ def test_chord_between_walls(case):
     assert conductance == pytest.approx(case["value"], rel=6e-4)
 
 
+EXACT = [case for case in LATTICES if case["angle_deg"] >= 20]
+
+
+@pytest.mark.parametrize("case", EXACT, ids=lambda c: f"{c['lattice']}-{c['angle_deg']}")
+def test_exact_converges_to_finite_elements_on_lattices(case):
+    """Degrees 0 .. 3 of the flux modes; the truth is known to its own error only."""
+    network = overlap_contacts(lattice(case["lattice"], 2.0 * np.cos(np.radians(case["angle_deg"])), 1))
+    found = [effective_conductivity(medium_of(network), method="exact", modes=n).tensor[0, 0] for n in (1, 2, 3, 4)]
+    errors = np.abs(np.array(found) / case["value"] - 1.0)
+    own = case["error"] / case["value"]
+    assert errors[3] < own
+    assert errors[2] < 1.5 * own
+    assert errors[0] > errors[1] > errors[2]
+    steps = np.abs(np.diff(found))
+    assert steps[2] < steps[1] < steps[0]
+
+
+@pytest.mark.parametrize("case", WALLS, ids=lambda c: f"{c['case']}")
+def test_exact_between_walls_that_cut_the_spheres_on_all_sides(case):
+    centers = np.array(case["centres"])[:, [2, 0, 1]]
+    network = overlap_contacts(ParticlePacking(centers, np.array(case["radii"]), Box((1.0, 1.0, 1.0))))
+    found = effective_conductivity(medium_of(network), method="exact", axes=(0,)).tensor[0, 0]
+    assert found == pytest.approx(case["value"], rel=case["error"] / case["value"])
+
+
 @pytest.mark.parametrize("name", CELLS)
 def test_small_contacts_conduct_like_two_kappa_c(name):
     """A contact of radius c between half-spaces passes 2 kappa c (Holm)."""

@@ -51,8 +51,8 @@ def test_a_real_lammps_bed_brings_its_box():
 
 def test_floating_grains_of_the_bed_are_normal():
     """Before the fall nothing touches enough to conduct; after it the bed wraps around x."""
-    before = effective_conductivity(medium_of(medium_of(overlap_contacts(read_dump(BED, 0).packing))), axes=(0,))
-    after = effective_conductivity(medium_of(medium_of(overlap_contacts(read_dump(BED, 1).packing))), axes=(0,))
+    before = effective_conductivity(medium_of(overlap_contacts(read_dump(BED, 0).packing)), axes=(0,))
+    after = effective_conductivity(medium_of(overlap_contacts(read_dump(BED, 1).packing)), axes=(0,))
     assert (before.tensor[0, 0], before.spans[0]) == (0.0, False)
     assert after.spans[0]
     assert after.tensor[0, 0] > 0.01

@@ -174,7 +174,7 @@ def test_dead_ends_take_the_temperature_they_hang_on():
 
 
 def test_what_is_refused(random_network):
-    with pytest.raises(InputError, match="unknown pipe resistance 'round'"):
+    with pytest.raises(InputError, match="the pipe network has no method 'round'"):
         pipe_conductivity(medium_of(random_network), method="round")
     with pytest.raises(InputError, match="the conductivity must be positive"):
         pipe_conductivity(medium_of(random_network, 0.0))

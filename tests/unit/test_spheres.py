@@ -161,7 +161,7 @@ def test_contacts_that_meet_and_what_else_cannot_be_are_refused():
         bonded_contacts(triple, np.radians(90.0))
     with pytest.raises(GeometryError, match="one lies inside the other"):
         overlap_contacts(ParticlePacking([[1.0, 1.0, 1.0], [1.1, 1.0, 1.0]], [0.5, 0.2], box))
-    with pytest.raises(InputError, match="unknown method 'enhanced' of a sphere: expected one of chord, standard"):
+    with pytest.raises(InputError, match="method enhanced of engine dtem works in 2D, found a medium in 3D"):
         effective_conductivity(medium_of(bonded_contacts(triple, 0.1)), method="enhanced")
 
 

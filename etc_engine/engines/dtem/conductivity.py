@@ -76,7 +76,7 @@ def element_conductivity(
     if method == "chord" and medium.dimension == 2:
         estimates = [chord_error_estimate(s, load) for s in result.solutions for load in range(len(s.axes))]
         return replace(result, model_error=max(estimates))
-    if method != "exact":
+    if method != "exact" or medium.dimension != 2:
         return result
     bounds = conductivity_bounds(result)
     apart = [upper / lower - 1.0 for lower, upper in bounds if lower > 0.0]

@@ -73,8 +73,8 @@ class FacetSolution:
         return Backbone(np.ones(self.links.count, dtype=np.bool_), driven, clusters, (True,) * len(self.axes))
 
     def wall_heat(self) -> tuple[float, float]:
-        """Heat flow into the spheres at the low wall and out of them at the far wall [W]."""
-        at_wall = self.sides.nodes >= self.sides.between
+        """Heat flow into the spheres at the low wall and out of them at the far one [W]."""
+        at_wall = self.sides.links[self.sides.nodes] >= self.links.count
         hot = at_wall & (self.temperatures[:, 0] == 1.0)
         return float(self.heat_flows[hot, 0].sum()), -float(self.heat_flows[at_wall & ~hot, 0].sum())
 
@@ -180,9 +180,10 @@ def _prescribe(
     if links.packing.box.periodic[axes[0]]:
         prescribed[0] = True
         return sides.arms[:, list(axes)], prescribed
-    prescribed[sides.between :] = True
+    wall = sides.links >= links.count
+    prescribed[wall] = True
     hot = np.zeros(sides.links.size)
-    hot[sides.between :] = wall_temperatures(links.walls[sides.links[sides.between :] - links.count])
+    hot[wall] = wall_temperatures(links.walls[sides.links[wall] - links.count])
     return hot[sides.nodes, None], prescribed
 
 

@@ -15,8 +15,10 @@ from etc_engine.engines.dtem.closed_form import closed_form_potentials, closed_f
 from etc_engine.engines.dtem.element import Elements, Resistances, condensed_elements, contact_potentials
 from etc_engine.engines.dtem.exact import element as exact
 from etc_engine.engines.dtem.exact.element import exact_elements, exact_potentials
+from etc_engine.engines.dtem.exact.spheres import DEGREE, exact_sphere_elements, exact_sphere_potentials
 from etc_engine.errors import InputError
 from etc_engine.laws.by_dimension import LAWS
+from etc_engine.laws.sphere_modes import number_of_modes
 from etc_engine.medium.sides import ContactSides
 
 MakeResistances = Callable[[ContactSides, NDArray[np.float64], int], Resistances]
@@ -34,15 +36,18 @@ class Variant:
     potentials : callable
         (sides, conductivity, flows of shape (s, modes)) -> contact temperatures above the particle's mean, shape (s,).
     modes : int
-        Flux modes of a contact, unless others are asked for; a variant with 1 has no more.
+        Flux modes of a contact, unless others are asked for; a variant with 1 has no more. On the disk between two
+        spheres ``modes`` stands for all modes of a degree below it.
     uniform_flux : bool
         Whether the flux is uniform over an arc; otherwise it follows Chebyshev modes over sqrt(1 - s^2).
     exact_cuts : bool
         Whether the disks lose what contacts and walls cut off: insulated walls and dead ends count then.
     resistances : callable, optional
         (sides, conductivity, modes) -> Resistances, which a transient needs; None where there is no such form.
-    dimensions : tuple of int
-        2 for disks, 3 for spheres.
+    most : int
+        Largest ``modes``: beyond it the matrices of an element lose their last digits.
+    count : callable
+        ``modes`` -> how many modes that are.
     """
 
     elements: Callable[[ContactSides, NDArray[np.float64], int], Elements]
@@ -51,7 +56,8 @@ class Variant:
     uniform_flux: bool
     exact_cuts: bool = False
     resistances: MakeResistances | None = None
-    dimensions: tuple[int, ...] = (2,)
+    most: int = 10
+    count: Callable[[int], int] = int
 
 
 def _elements_of(make: MakeResistances, sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
@@ -66,7 +72,7 @@ def _arc_potentials(
 
 
 def _closed_form(name: str) -> Variant:
-    """A variant in closed form, for the dimensions whose law has it."""
+    """A variant in closed form."""
     make = partial(closed_form_resistances, method=name)
     return Variant(
         partial(_elements_of, make),
@@ -74,15 +80,12 @@ def _closed_form(name: str) -> Variant:
         modes=1,
         uniform_flux=name != "chord",
         resistances=make,
-        dimensions=tuple(d for d, law in LAWS.items() if name in law.self_resistances),
     )
 
 
-MOST_MODES = 10
-"""Beyond these the matrices of an element lose their last digits."""
-
+_CLOSED_FORMS = {name: _closed_form(name) for name in LAWS[2].self_resistances}
 METHODS: Mapping[str, Variant] = {
-    **{name: _closed_form(name) for name in LAWS[2].self_resistances},
+    **_CLOSED_FORMS,
     "arc": Variant(
         partial(_elements_of, arc_resistances),
         _arc_potentials,
@@ -92,6 +95,26 @@ METHODS: Mapping[str, Variant] = {
     ),
     "exact": Variant(exact_elements, exact_potentials, exact.MODES, uniform_flux=False, exact_cuts=True),
 }
+METHODS_BY_DIMENSION: Mapping[int, Mapping[str, Variant]] = {
+    2: METHODS,
+    3: {
+        **{name: _CLOSED_FORMS[name] for name in LAWS[3].self_resistances},
+        "exact": Variant(
+            exact_sphere_elements,
+            exact_sphere_potentials,
+            DEGREE + 1,
+            uniform_flux=False,
+            exact_cuts=True,
+            most=6,
+            count=lambda modes: number_of_modes(modes - 1),
+        ),
+    },
+}
+
+
+def dimensions_of(name: str) -> tuple[int, ...]:
+    """2 for disks and 3 for spheres, where a method has them."""
+    return tuple(dimension for dimension, known in METHODS_BY_DIMENSION.items() if name in known)
 
 
 def find_method(name: str, dimension: int = 2) -> Variant:
@@ -102,11 +125,11 @@ def find_method(name: str, dimension: int = 2) -> Variant:
     InputError
         If there is none.
     """
-    known = [word for word, variant in METHODS.items() if dimension in variant.dimensions]
+    known = METHODS_BY_DIMENSION[dimension]
     if name not in known:
         particles = "" if dimension == 2 else f" of a {LAWS[dimension].name}"
         raise InputError(f"unknown method {name!r}{particles}: expected one of {', '.join(known)}")
-    return METHODS[name]
+    return known[name]
 
 
 def flux_modes(name: str, modes: int | None, dimension: int = 2) -> int:
@@ -117,11 +140,11 @@ def flux_modes(name: str, modes: int | None, dimension: int = 2) -> int:
     InputError
         If the method does not have them.
     """
-    own = find_method(name, dimension).modes
-    if modes is None or modes == own:
-        return own
-    if own == 1:
+    variant = find_method(name, dimension)
+    if modes is None or modes == variant.modes:
+        return variant.count(variant.modes)
+    if variant.modes == 1:
         raise InputError(f"method {name} has one flux mode per contact, found modes = {modes}: leave it out")
-    if not 1 <= modes <= MOST_MODES:
-        raise InputError(f"the number of flux modes must lie between 1 and {MOST_MODES}, found {modes}")
-    return modes
+    if not 1 <= modes <= variant.most:
+        raise InputError(f"the number of flux modes must lie between 1 and {variant.most}, found {modes}")
+    return variant.count(modes)

@@ -158,7 +158,7 @@ def cut_chords(
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=sides.offsets.size - 1))])
     rows = np.concatenate([kept, np.full(cuts.particles.size, -1) if cut_rows is None else cut_rows])[order]
-    arms = np.concatenate([sides.arms[kept], cuts.directions])[order]
+    arms = np.concatenate([sides.arms[kept], cuts.arms])[order]
     theta = position_angles(arms)
     alpha = np.concatenate([sides.alpha[kept], cuts.alpha])[order]
     exponents = np.concatenate([edge_exponents(sides, conductivity)[kept], np.ones(cuts.particles.size)])[order]
