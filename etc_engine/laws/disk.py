@@ -28,10 +28,11 @@ from etc_engine.errors import InputError
 _ZETA_3 = 1.2020569031595942
 _TERMS = 22
 
-# C(x) = zeta(3) + x^2/2 ln x - 3 x^2/4 + x^4 sum_k c_k x^{2k}, from ln(sin z / z) = -sum zeta(2k) (z/pi)^{2k} / k
-_REMAINDER = np.array(
+CLAUSEN_SERIES = np.array(
     [-zeta(2 * k) / (k * (2 * k + 1) * (2 * k + 2)) / (2.0 * np.pi) ** (2 * k) for k in range(1, _TERMS + 1)]
 )
+"""The c_k of C(x) = zeta(3) + x^2/2 ln x - 3 x^2/4 + x^4 sum_k c_k x^{2k}, from the series of ln(sin z / z)."""
+
 # mean of ln cos(t/2) over |t| <= alpha, as a series in alpha^2, from ln cos z = ln(sin 2z / 2z) - ln(sin z / z)
 _LN_COS = np.array([-zeta(2 * k) * (4.0**k - 1.0) / (k * (2 * k + 1)) / (2.0 * np.pi) ** (2 * k) for k in range(1, 61)])
 
@@ -40,13 +41,24 @@ _ENHANCED_DEGREES = np.array([1.0, 2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0])
 _ENHANCED_FACTORS = np.array([0.9799, 0.9762, 0.9729, 0.9707, 0.9693, 0.9682, 0.9675, 0.9672, 0.9671])
 
 
+def position_angles(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Position angle of each arm of a disk, shape (s,) [rad], for arms of shape (s, 2).
+
+    Examples
+    --------
+    >>> position_angles(np.array([[0.0, 2.0], [-1.0, 0.0]])) / np.pi
+    array([0.5, 1. ])
+    """
+    return np.asarray(np.arctan2(arms[:, 1], arms[:, 0]))
+
+
 @njit(cache=True)
 def _remainder(x: float) -> float:
     """C(x) less its singular part zeta(3) + x^2/2 ln x - 3x^2/4, for 0 <= x <= pi."""
     square = x * x
     value = 0.0
     for k in range(_TERMS - 1, -1, -1):
-        value = value * square + _REMAINDER[k]
+        value = value * square + CLAUSEN_SERIES[k]
     return value * square * square
 
 
@@ -190,7 +202,7 @@ def standard_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
 
 
 def _smooth_remainder(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    return x**4 * np.polynomial.polynomial.polyval(x * x, _REMAINDER)
+    return x**4 * np.polynomial.polynomial.polyval(x * x, CLAUSEN_SERIES)
 
 
 def enhanced_resistance(alpha: ArrayLike) -> NDArray[np.float64]:

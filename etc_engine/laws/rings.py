@@ -26,7 +26,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.errors import InputError
-from etc_engine.laws.coaxial import Y_TERMS, beta_sums, coaxial_tables, y_sum
+from etc_engine.laws.coaxial import Y_TERMS, coaxial_column, coaxial_tables
 from etc_engine.laws.sphere import chord_resistance
 
 RINGS = 12
@@ -37,7 +37,7 @@ WIDEST_CONTACT = np.sin(np.radians(85.0))
 """Largest contact radius, in radii of the smaller sphere."""
 
 # Gauss points per ring, in the logarithm of the gap.
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(6)
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 # The flux density at the edge of a contact without a gap is cut off at this part of the first ring.
 _EDGE = 1e-3
 # A gap below this part of the smaller radius is closed.
@@ -260,18 +260,17 @@ def _cap_matrix(
 ) -> None:
     """F of all caps into ``caps[1:, 1:]``, D of the disk in them into row and column 0; ``b`` = sin^2(theta/2)."""
     radius = row[_R1 + side]
-    coefficients = np.empty(Y_TERMS)
+    column, work = np.empty(RINGS + 1), np.empty((6, max(Y_TERMS, RINGS + 1)))
     for k in range(rings + 1):
         sine = min(edges[k] / radius, 1.0)
         b[k] = 0.5 * sine * sine / (1.0 + np.sqrt(1.0 - sine * sine))
     for k in range(rings + 1):
-        beta = np.sqrt(b[k])
-        beta_sums(tables[0], beta, coefficients)
+        coaxial_column(tables[0], b, k, k + 1, column, work)
         for l in range(k + 1):
-            caps[1 + l, 1 + k] = caps[1 + k, 1 + l] = y_sum(coefficients, np.sqrt(b[l]) / beta, beta)
+            caps[1 + l, 1 + k] = caps[1 + k, 1 + l] = column[l]
         if row[_CONTACT] > 0.0:
-            beta_sums(tables[1], beta, coefficients)
-            caps[0, 1 + k] = caps[1 + k, 0] = y_sum(coefficients, np.sqrt(b[0]) / beta, beta)
+            coaxial_column(tables[1], b, k, 1, column, work)
+            caps[0, 1 + k] = caps[1 + k, 0] = column[0]
 
 
 @njit(cache=True)
@@ -382,7 +381,7 @@ def _solve_ones(a: NDArray[np.float64], n: int, x: NDArray[np.float64]) -> None:
         x[i] /= a[i, i]
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
 def legendre_means(row: NDArray[np.float64], side: int, shape: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """a_l = sum_k w_k A_l(mode k) of one side, l = 1 .. out.size, into ``out``.
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from etc_engine.errors import InputError
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.laguerre import laguerre_facets, refuse_hidden
@@ -68,6 +67,38 @@ class FacetLinks:
         return centers[self.pairs[:, 1]] - centers[self.pairs[:, 0]] + self.shifts * lengths
 
     @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """Distance of the two centres, and of the centre from the wall, shape (m + w,) [m]."""
+        return np.concatenate([np.linalg.norm(self.branches, axis=1), self.wall_distances])
+
+    @cached_property
+    def smaller_radii(self) -> NDArray[np.float64]:
+        """Radius of the smaller sphere of each link, shape (m + w,) [m]."""
+        radii = self.packing.radii
+        return np.concatenate([radii[self.pairs].min(axis=1, initial=np.inf), radii[self.wall_particles]])
+
+    @cached_property
+    def overlap_of_caps(self) -> NDArray[np.float64]:
+        r"""S = sum_j n_j n_j^T (1 - cos^3 psi_j)/2 of every sphere, shape (n, 3, 3).
+
+        The caps have the areas of the facets, seen along the line of centres. If they tiled the sphere, S would be I.
+        Walls of all kinds count.
+        """
+        m, radii = self.count, self.packing.radii
+        normals = self.branches / self.lengths[:m, None]
+        owner = np.concatenate([self.pairs[:, 0], self.pairs[:, 1], self.wall_particles])
+        normals = np.concatenate([normals, -normals, self.wall_normals])
+        rho = np.minimum(np.sqrt(np.concatenate([self.areas, self.wall_areas]) / np.pi), self.smaller_radii)
+        sine = np.minimum(np.concatenate([rho[:m], rho]) / radii[owner], 1.0)
+        weight = 0.5 * (1.0 - (1.0 - sine**2) ** 1.5)
+        overlap = np.empty((radii.size, 3, 3))
+        for a in range(3):
+            for b in range(a + 1):
+                overlap[:, a, b] = np.bincount(owner, weight * normals[:, a] * normals[:, b], minlength=radii.size)
+                overlap[:, b, a] = overlap[:, a, b]
+        return overlap
+
+    @cached_property
     def wall_normals(self) -> NDArray[np.float64]:
         """Unit vectors from the sphere to its wall, shape (w, 3)."""
         normals = np.zeros((self.walls.size, 3))
@@ -75,15 +106,13 @@ class FacetLinks:
         return normals
 
 
-def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) -> FacetLinks:
+def facet_links(network: ContactNetwork) -> FacetLinks:
     """All links of a packing of spheres: the facets of its Laguerre tessellation, joined with its contacts.
 
     Parameters
     ----------
     network : ContactNetwork
         Three-dimensional; its contacts become contact disks of radius R sin(alpha), the smaller of the two sides'.
-    contact_resistance : float or array_like, shape (contacts + wall contacts,) [K/W]
-        Of each contact of the network.
 
     Returns
     -------
@@ -92,7 +121,7 @@ def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) ->
     Raises
     ------
     InputError, GeometryError
-        If a resistance is negative, the box is not three-dimensional, or a particle is hidden (see
+        If the box is not three-dimensional, or a particle is hidden (see
         `etc_engine.structure.laguerre.refuse_hidden`).
 
     Notes
@@ -111,11 +140,6 @@ def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) ->
     packing = network.packing
     facets = laguerre_facets(packing)
     refuse_hidden(facets)
-    m, w = network.count, network.walls.size
-    resistance = np.asarray(contact_resistance, dtype=np.float64)
-    if not (resistance >= 0.0).all() or resistance.shape not in ((), (m + w,)):
-        raise InputError(f"the contact resistance must be >= 0, one number or an array of shape ({m + w},)")
-    resistance = np.broadcast_to(resistance, (m + w,))
     widths = (packing.radii[network.pairs] * np.sin(network.angles)).min(axis=1, initial=np.inf)
     at, alone = _find(_pair_keys(facets.pairs, facets.shifts), _pair_keys(network.pairs, network.shifts))
     wall_at, wall_alone = _find(
@@ -124,9 +148,14 @@ def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) ->
     wall_widths = packing.radii[network.wall_particles] * np.sin(network.wall_angles)
     wall_depths = packing.radii[network.wall_particles] * np.cos(network.wall_angles)
     contacts = [np.zeros(facets.count), widths[alone], np.zeros(facets.walls.size), wall_widths[wall_alone]]
-    bonds = [np.zeros(facets.count), resistance[:m][alone], np.zeros(facets.walls.size), resistance[m:][wall_alone]]
+    bonds = [
+        np.zeros(facets.count),
+        network.resistances[alone],
+        np.zeros(facets.walls.size),
+        network.wall_resistances[wall_alone],
+    ]
     contacts[0][at], contacts[2][wall_at] = widths[~alone], wall_widths[~wall_alone]
-    bonds[0][at], bonds[2][wall_at] = resistance[:m][~alone], resistance[m:][~wall_alone]
+    bonds[0][at], bonds[2][wall_at] = network.resistances[~alone], network.wall_resistances[~wall_alone]
     return FacetLinks(
         packing,
         np.concatenate([facets.pairs, network.pairs[alone]]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -104,7 +105,7 @@ def _frames(path: Path, kind: str, header_lines: int) -> Iterator[CountedFrame]:
                     f"{header[0][:40]!r}"
                 )
             start, rows, ended = position, 0, True
-            for line in islice(stream, count):
+            for line in islice(stream, min(count, sys.maxsize)):
                 position += len(line)
                 rows, ended = rows + 1, line.endswith(b"\n")
             yield CountedFrame(number, tuple(header), count, start, position, rows == count and ended)

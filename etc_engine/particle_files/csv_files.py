@@ -6,6 +6,7 @@ import csv
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 from etc_engine.box import AXES, Box
 from etc_engine.errors import InputError
@@ -121,18 +122,21 @@ def table_rows(
     )
 
 
-def write_csv(path: Path | str, table: ParticleTable) -> None:
-    """Write particles as CSV, with as many digits as it takes to read back the same numbers."""
+def write_csv(target: Path | str | TextIO, table: ParticleTable) -> None:
+    """Write particles as CSV to a file or an open stream, with as many digits as read back the same numbers."""
+    if isinstance(target, (str, Path)):
+        with Path(target).open("w", newline="", encoding="utf-8") as file:
+            write_csv(file, table)
+        return
     packing = table.packing
     names = [*AXES[: packing.dimension], "radius"]
     columns = [*packing.centers.T, packing.radii]
     if table.conductivity is not None:
         names.append("conductivity")
         columns.append(table.conductivity)
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
 
 
 def numbered_lines(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:

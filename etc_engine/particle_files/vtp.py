@@ -193,8 +193,11 @@ def _add(place: Any, name: str, array: Any) -> None:
 def _silent(core: Any) -> Iterator[None]:
     """Without vtk's own words on stderr: what goes wrong is raised."""
     shown = core.vtkObject.GetGlobalWarningDisplay()
+    cutoff = core.vtkLogger.GetCurrentVerbosityCutoff()
     core.vtkObject.SetGlobalWarningDisplay(0)
+    core.vtkLogger.SetStderrVerbosity(core.vtkLogger.VERBOSITY_OFF)
     try:
         yield
     finally:
         core.vtkObject.SetGlobalWarningDisplay(shown)
+        core.vtkLogger.SetStderrVerbosity(core.vtkLogger.ConvertToVerbosity(int(cutoff)))

@@ -170,3 +170,18 @@ def test_elastic_and_plastic_asperities_are_alike_where_their_pressures_are():
 def test_bad_input_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_grey_exchange():
+    """T^3, black, mirrors, and the linear form against sigma (T_1^4 - T_2^4)."""
+    from etc_engine.laws.radiation import STEFAN_BOLTZMANN, grey_exchange
+
+    assert grey_exchange(600.0, 0.8, 0.8) / grey_exchange(300.0, 0.8, 0.8) == pytest.approx(8.0)
+    assert grey_exchange(500.0, 1.0, 1.0) == pytest.approx(4.0 * STEFAN_BOLTZMANN * 500.0**3)
+    assert grey_exchange(500.0, 0.7, 0.7) == pytest.approx(4.0 * STEFAN_BOLTZMANN * 500.0**3 / (2.0 / 0.7 - 1.0))
+    assert grey_exchange(500.0, [0.0, 0.5], 0.9).tolist()[0] == 0.0
+    exact = STEFAN_BOLTZMANN * (505.0**4 - 495.0**4) / 10.0
+    assert grey_exchange(500.0, 1.0, 1.0) == pytest.approx(exact, rel=2e-4)
+    for bad in ((-5.0, 0.5, 0.5), (500.0, 1.5, 0.5), (500.0, 0.5, -0.1)):
+        with pytest.raises(InputError):
+            grey_exchange(*bad)

@@ -19,6 +19,7 @@ from etc_engine.engines.dtem.facet_steady import (
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.medium.facets import facet_links
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+from etc_engine.models.lattice_sums import BCC, FCC, coupling
 from etc_engine.packing.particles import ParticlePacking
 
 DATA = Path(__file__).parent.parent / "published" / "data" / "spheres"
@@ -134,7 +135,7 @@ def test_walls_are_mirrors():
 def test_contact_resistance_blocks_the_disk_alone():
     packing = lattice("fcc", 2.0 * np.cos(np.radians(10.0)))
     network = overlap_contacts(packing)
-    links = {r: facet_links(network, r) for r in (0.0, 0.05, 1e9)}
+    links = {r: facet_links(network.with_resistance(r)) for r in (0.0, 0.05, 1e9)}
     k = {r: facet_conductivity(v, uniform_material(v, 100.0, 1.0)).tensor[0, 0] for r, v in links.items()}
     assert k[0.0] > k[0.05] > k[1e9]
     vacuum = [facet_conductivity(v, uniform_material(v, 100.0, 1e-6)).tensor[0, 0] for v in links.values()]
@@ -174,6 +175,31 @@ def test_radiation_and_rarefied_gas_reach_every_link():
     assert np.trace(conductivity(packing, 100.0, 0.0, radiation=5.0)) > 0.0
 
 
+def multipole_sum(name, contrast, jump, gap, highest=61):
+    """k/k_f of an array with a temperature jump T_s - T_f = jump dT/dn at the surfaces (radius 1).
+
+    Inside, multipole l has T = A r^l; with the jump the fluid at the surface sees the conductivity
+    kappa/(1 + l jump kappa/k_f), for every l its own. All else is the multipole expansion of the array.
+    """
+    coefficients, l = coupling({"bcc": BCC, "fcc": FCC}[name], highest)
+    seen = contrast / (1.0 + contrast * l * jump)
+    beta = l * (seen - 1.0) / (l * seen + l + 1.0)
+    gain, size = (2.0 / (2.0 + gap)) ** (l + 0.5), 2.0 / (2.0 + gap)
+    matrix = np.eye(l.size) - (beta * gain)[:, None] * coefficients * gain
+    dipole = np.linalg.solve(matrix, np.where(np.arange(l.size) == 0, beta, 0.0))[0]
+    x = dipole * {"bcc": BCC, "fcc": FCC}[name].touching_fraction * size**3
+    return (1.0 + 2.0 * x) / (1.0 - x)
+
+
+@pytest.mark.parametrize("name", ["bcc", "fcc"])
+@pytest.mark.parametrize(("jump", "tolerance"), [(1e-3, 0.011), (0.01, 0.018), (0.1, 0.046), (0.3, 0.035)])
+def test_rarefied_gas_against_multipole_sums_with_jumps(name, jump, tolerance):
+    for contrast in (10.0, 1e3):
+        for gap in (0.1, 0.02):
+            k = conductivity(lattice(name, 2.0 + gap), contrast, jumps=2.0 * jump)[0, 0]
+            assert k == pytest.approx(multipole_sum(name, contrast, jump, gap), rel=tolerance)
+
+
 def test_low_coordination_is_reported():
     for name, contrast, expected in (
         ("simple_cubic", 100.0, True),
@@ -201,4 +227,21 @@ def test_hidden_spheres_and_bad_material_are_refused():
     with pytest.raises(InputError, match="pores that conduct"):
         facet_conductivity(links, uniform_material(links, 10.0, 0.0))
     with pytest.raises(InputError, match="contact resistance"):
-        facet_links(overlap_contacts(lattice("bcc", 2.01)), -1.0)
+        facet_links(overlap_contacts(lattice("bcc", 2.01)).with_resistance(-1.0))
+
+
+def test_rarefied_gas_goes_to_vacuum_and_to_the_continuum():
+    """p -> inf: jumps vanish. p -> 0: gas carries nothing, what is left is radiation alone, also in the columns."""
+    packing = random_packing("rp5.csv")
+    links = facet_links(overlap_contacts(packing))
+    continuum = facet_conductivity(links, uniform_material(links, 100.0, 1.0)).tensor
+    dense = uniform_material(links, 100.0, 1.0, jumps=1e-9, open_fluid=1.0 - 1e-9)
+    np.testing.assert_allclose(facet_conductivity(links, dense).tensor, continuum, rtol=1e-6, atol=1e-9)
+    glow = facet_conductivity(links, uniform_material(links, 100.0, 0.0, radiation=0.5)).tensor
+    thin = uniform_material(links, 100.0, 1.0, jumps=1e9, radiation=0.5, open_fluid=1e-9)
+    np.testing.assert_allclose(facet_conductivity(links, thin).tensor, glow, rtol=1e-5, atol=1e-6)
+    k = [
+        np.trace(facet_conductivity(links, uniform_material(links, 100.0, 1.0, jumps=j)).tensor)
+        for j in (0.0, 1e-3, 1e-2, 1e-1)
+    ]
+    assert (np.diff(k) < 0.0).all()

@@ -29,10 +29,8 @@ from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.rings import FacingSpheres, condense_pairs, legendre_means
 from etc_engine.medium.facets import FacetLinks
 
-TERMS = 100
+TERMS = 64
 """Legendre terms between two facets, L."""
-
-
 SMALL_FACET = 0.02
 """Facets below this part of the squared radius of the smaller sphere are columns alone."""
 REPAIR_POWER = 1.25
@@ -48,7 +46,9 @@ class FacetMaterial:
     conductivity : ndarray, shape (n,) [W/(m K)]
         Of each sphere.
     fluid : ndarray, shape (m + w,) [W/(m K)]
-        Conductivity of the fluid in each link, between spheres first, at walls after them.
+        Conductivity of the continuum fluid in each link, between spheres first, at walls after them.
+    open_fluid : ndarray, shape (m + w,) [W/(m K)]
+        Of the fluid in the open pore beyond the spheres, the columns; below `fluid` where the gas is rarefied.
     jumps : ndarray, shape (m + w,) [m]
         Temperature jump lengths of a link, both surfaces together.
     radiation : ndarray, shape (m + w,) [W/(m2 K)]
@@ -57,6 +57,7 @@ class FacetMaterial:
 
     conductivity: NDArray[np.float64]
     fluid: NDArray[np.float64]
+    open_fluid: NDArray[np.float64]
     jumps: NDArray[np.float64]
     radiation: NDArray[np.float64]
 
@@ -81,8 +82,8 @@ class FacetSides:
         Link of each node.
     columns : ndarray, shape (nodes,) [m2]
         Area of a column; 0 for a node with rings.
-    between : int
-        Number of nodes between spheres.
+    spheres : ndarray of int, shape (n,)
+        The sphere of each element.
     """
 
     offsets: NDArray[np.int64]
@@ -92,12 +93,7 @@ class FacetSides:
     arms: NDArray[np.float64]
     links: NDArray[np.int64]
     columns: NDArray[np.float64]
-    between: int
-
-    @property
-    def spheres(self) -> NDArray[np.int64]:
-        """Sphere of each side, shape (s,)."""
-        return np.repeat(np.arange(self.offsets.size - 1), np.diff(self.offsets))
+    spheres: NDArray[np.int64]
 
 
 def facet_sides(links: FacetLinks, driven: NDArray[np.bool_], fluid: bool = True) -> FacetSides:
@@ -111,8 +107,7 @@ def facet_sides(links: FacetLinks, driven: NDArray[np.bool_], fluid: bool = True
     fluid : bool
         Whether there are columns of fluid; without it heat crosses the pores by radiation alone.
     """
-    radii, m = links.packing.radii, links.count
-    small = np.concatenate([radii[links.pairs].min(axis=1, initial=np.inf), radii[links.wall_particles]])
+    radii, m, small = links.packing.radii, links.count, links.smaller_radii
     area = np.concatenate([links.areas, links.wall_areas])
     wide = (area >= SMALL_FACET * small**2) | (links.contacts > 0.0)
     column = np.where(wide, area - np.pi * small**2, area)
@@ -141,7 +136,25 @@ def facet_sides(links: FacetLinks, driven: NDArray[np.bool_], fluid: bool = True
         arms,
         of_links,
         np.where(is_column, column[of_links], 0.0),
-        between,
+        np.arange(radii.size),
+    )
+
+
+def sample_sides(sides: FacetSides, elements: NDArray[np.int64]) -> FacetSides:
+    """The sides of some spheres alone; links to other spheres stay, with one side."""
+    sizes = np.diff(sides.offsets)[elements]
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    rows = np.repeat(sides.offsets[elements] - offsets[:-1], sizes) + np.arange(offsets[-1])
+    kept, nodes = np.unique(sides.nodes[rows], return_inverse=True)
+    return FacetSides(
+        offsets,
+        nodes.reshape(-1),
+        sides.ends[rows],
+        sides.normals[rows],
+        sides.arms[rows],
+        sides.links[kept],
+        sides.columns[kept],
+        sides.spheres[elements],
     )
 
 
@@ -153,22 +166,19 @@ def _kinds(groups: list[NDArray[np.int64]], m: int) -> list[tuple[NDArray[np.boo
 
 def facing_spheres(links: FacetLinks, material: FacetMaterial, rows: NDArray[np.int64]) -> FacingSpheres:
     """The links ``rows`` as pairs of facing spheres; a wall link is half of the sphere and its mirror image."""
-    m, radii, kappa = links.count, links.packing.radii, material.conductivity
+    m, radii = links.count, links.packing.radii
     wall = rows >= m
     ends = np.empty((rows.size, 2), dtype=np.int64)
     ends[~wall] = links.pairs[rows[~wall]]
     ends[wall] = links.wall_particles[rows[wall] - m, None]
-    distances = np.concatenate([np.linalg.norm(links.branches, axis=1), 2.0 * links.wall_distances])[rows]
     area = np.concatenate([links.areas, links.wall_areas])[rows]
-    twice = np.where(wall, 2.0, 1.0)
-    small = radii[ends].min(axis=1, initial=np.inf)
-    contacts = links.contacts[rows]
+    twice, contacts = np.where(wall, 2.0, 1.0), links.contacts[rows]
     return FacingSpheres(
-        distances,
-        np.minimum(np.maximum(np.sqrt(area / np.pi), contacts), small),
+        twice * links.lengths[rows],
+        np.minimum(np.maximum(np.sqrt(area / np.pi), contacts), links.smaller_radii[rows]),
         contacts,
         radii[ends],
-        kappa[ends],
+        material.conductivity[ends],
         material.fluid[rows],
         twice * material.jumps[rows],
         material.radiation[rows] / twice,
@@ -191,51 +201,33 @@ def facet_resistances(
     ringed = np.flatnonzero(sides.columns == 0.0)
     facing = facing_spheres(links, material, sides.links[ringed])
     condensed = condense_pairs(facing)
-    half = np.where(np.arange(sides.links.size) < sides.between, 0.5, 1.0)  # a wall link has one side
-    mirrored = np.where(sides.links < links.count, 1.0, 0.5)
     pair = np.full(sides.links.size, -1, dtype=np.int64)
     pair[ringed] = np.arange(ringed.size)
     added = np.zeros(sides.links.size)
-    added[ringed] = condensed.gaps * mirrored[ringed] * half[ringed]
-    lengths = np.concatenate([np.linalg.norm(links.branches, axis=1), links.wall_distances])[sides.links]
-    tubes = sides.columns > 0.0
-    added[tubes] = lengths[tubes] / (material.fluid[sides.links[tubes]] * sides.columns[tubes]) * half[tubes]
+    added[ringed] = 0.5 * condensed.gaps  # half on either side; at a wall half of the mirrored pair
+    tubes = np.flatnonzero(sides.columns > 0.0)
+    of_tubes = sides.links[tubes]
+    share = np.where(of_tubes < links.count, 0.5, 1.0)
+    added[tubes] = share * links.lengths[of_tubes] / (material.open_fluid[of_tubes] * sides.columns[tubes])
     starts = packed_starts(sides.offsets)
     values = np.zeros(int(starts[-1]))
     l = np.arange(1, TERMS + 1)
+    kappa, radii = material.conductivity[sides.spheres], links.packing.radii[sides.spheres]
+    pores = material.open_fluid[sides.links[sides.nodes]]
+    pores = np.add.reduceat(pores, sides.offsets[:-1]) / np.diff(sides.offsets)
+    factor = (2.0 * pores / (pores + kappa)) ** REPAIR_POWER
+    uneven = np.linalg.inv(links.overlap_of_caps[sides.spheres]) - np.eye(3)
     _fill(
         (sides.offsets, pair[sides.nodes], sides.ends, sides.normals, added[sides.nodes]),
         np.ascontiguousarray(facing.rows),
         (condensed.shapes, condensed.constrictions),
-        1.0 / (4.0 * np.pi * material.conductivity * links.packing.radii),
-        _repair(links, material),
+        1.0 / (4.0 * np.pi * kappa * radii),
+        factor[:, None, None] * uneven,
         (2 * l + 1) / l * np.sinc(l / (TERMS + 1)),
         starts,
         values,
     )
     return starts, values
-
-
-def _repair(links: FacetLinks, material: FacetMaterial) -> NDArray[np.float64]:
-    """The mending f (S^-1 - I) of l = 1, shape (n, 3, 3); caps at insulated walls tile the sphere too."""
-    radii, n = links.packing.radii, links.packing.count
-    normals = links.branches / np.linalg.norm(links.branches, axis=1, keepdims=True)
-    owner = np.concatenate([links.pairs[:, 0], links.pairs[:, 1], links.wall_particles])
-    normals = np.concatenate([normals, -normals, links.wall_normals])
-    small = radii[links.pairs].min(axis=1, initial=np.inf)
-    rho = np.minimum(np.sqrt(links.areas / np.pi), small)
-    at_walls = np.minimum(np.sqrt(links.wall_areas / np.pi), radii[links.wall_particles])
-    sine = np.minimum(np.concatenate([rho, rho, at_walls]) / radii[owner], 1.0)
-    weight = 0.5 * (1.0 - (1.0 - sine**2) ** 1.5)
-    overlap = np.empty((n, 3, 3))
-    fluid = np.concatenate([material.fluid[: links.count], material.fluid])
-    for a in range(3):
-        for b in range(a + 1):
-            overlap[:, a, b] = np.bincount(owner, weight * normals[:, a] * normals[:, b], minlength=n)
-            overlap[:, b, a] = overlap[:, a, b]
-    mean_fluid = np.bincount(owner, fluid * weight, minlength=n) / np.bincount(owner, weight, minlength=n)
-    factor = (2.0 * mean_fluid / (mean_fluid + material.conductivity)) ** REPAIR_POWER
-    return np.asarray(factor[:, None, None] * (np.linalg.inv(overlap) - np.eye(3)))
 
 
 @njit(cache=True)

@@ -20,9 +20,10 @@ from etc_engine.engines.dtem.facet_elements import (
 )
 from etc_engine.errors import InputError
 from etc_engine.medium.backbone import Backbone
-from etc_engine.medium.conductivity import EffectiveConductivity, assemble_tensor
+from etc_engine.medium.conductivity import EffectiveConductivity, effective_tensor
 from etc_engine.medium.facets import FacetLinks
-from etc_engine.solvers import SolveReport, solve_energy
+from etc_engine.medium.loads import driven_walls, wall_temperatures
+from etc_engine.solvers import SolveReport, solve_loads
 from etc_engine.solvers.star import star_preconditioner
 
 FEW_FACETS = 9
@@ -67,9 +68,15 @@ class FacetSolution:
     @property
     def backbone(self) -> Backbone:
         """Everything takes part: pores that conduct leave no dead ends."""
-        driven = driven_facets(self.links, self.axes)
+        driven = driven_walls(self.links, self.axes)
         clusters = np.zeros(self.links.packing.count, dtype=np.int64)
         return Backbone(np.ones(self.links.count, dtype=np.bool_), driven, clusters, (True,) * len(self.axes))
+
+    def wall_heat(self) -> tuple[float, float]:
+        """Heat flow into the spheres at the low wall and out of them at the far one [W]."""
+        at_wall = self.sides.links[self.sides.nodes] >= self.links.count
+        hot = at_wall & (self.temperatures[:, 0] == 1.0)
+        return float(self.heat_flows[hot, 0].sum()), -float(self.heat_flows[at_wall & ~hot, 0].sum())
 
     @cached_property
     def sphere_temperatures(self) -> NDArray[np.float64]:
@@ -88,8 +95,11 @@ def uniform_material(
     fluid: ArrayLike,
     jumps: ArrayLike = 0.0,
     radiation: ArrayLike = 0.0,
+    open_fluid: ArrayLike | None = None,
 ) -> FacetMaterial:
     """Material from one number, or one per sphere (conductivity) and per link (the rest).
+
+    ``open_fluid`` is the conductivity of the fluid beyond the spheres; that of the gaps if left out.
 
     Raises
     ------
@@ -100,6 +110,7 @@ def uniform_material(
     values = {
         "conductivity of the spheres": (conductivity, n),
         "pore conductivity": (fluid, m),
+        "conductivity of the open pore": (fluid if open_fluid is None else open_fluid, m),
         "temperature jump": (jumps, m),
         "radiative conductance": (radiation, m),
     }
@@ -118,11 +129,6 @@ def uniform_material(
             f"{pores.max(initial=0.0):.6g} W/(m K); use engine voxel or lattice for the opposite case"
         )
     return FacetMaterial(*arrays)
-
-
-def driven_facets(links: FacetLinks, axes: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Wall facets whose wall has a prescribed temperature, shape (w,)."""
-    return np.asarray((links.walls // 2 == axes[0]) & (not links.packing.box.periodic[axes[0]]))
 
 
 def solve_facets(
@@ -154,7 +160,7 @@ def solve_facets(
     -----
     Conjugate gradients, preconditioned by the elements as stars (`etc_engine.solvers.star`): 2 to 20 iterations.
     """
-    sides = facet_sides(links, driven_facets(links, axes), bool((material.fluid > 0.0).all()))
+    sides = facet_sides(links, driven_walls(links, axes), bool((material.open_fluid > 0.0).all()))
     starts, resistances = facet_resistances(links, material, sides)
     elements = facet_elements(sides, starts, resistances)
     system = assemble(elements, *_prescribe(links, sides, axes))
@@ -174,9 +180,10 @@ def _prescribe(
     if links.packing.box.periodic[axes[0]]:
         prescribed[0] = True
         return sides.arms[:, list(axes)], prescribed
-    prescribed[sides.between :] = True
+    wall = sides.links >= links.count
+    prescribed[wall] = True
     hot = np.zeros(sides.links.size)
-    hot[sides.between :] = 1.0 - links.walls[sides.links[sides.between :] - links.count] % 2
+    hot[wall] = wall_temperatures(links.walls[sides.links[wall] - links.count])
     return hot[sides.nodes, None], prescribed
 
 
@@ -186,26 +193,15 @@ def _solve(
     """Free temperatures of all loads."""
     size = system.matrix.shape[0]
     if size == 0:
-        return np.zeros(system.rhs.shape), tuple(
-            SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0) for _ in system.lift_energies
-        )
+        return solve_loads(system.matrix, system.rhs, system.lift_energies)
     widths = np.diff(elements.offsets)
     owner = np.repeat(np.arange(widths.size), widths)
     local = np.arange(owner.size) - elements.offsets[owner]
     diagonal = resistances[elements.starts[owner] + local * (widths[owner] + 1)]
     preconditioner = star_preconditioner(system.free[elements.nodes], owner, 1.0 / diagonal, size)
-    u = np.empty(system.rhs.shape)
-    reports = []
-    for load, lift_energy in enumerate(system.lift_energies):
-        u[:, load], report = solve_energy(
-            system.matrix,
-            np.ascontiguousarray(system.rhs[:, load]),
-            float(lift_energy),
-            preconditioner=preconditioner,
-            tolerance=tolerance,
-        )
-        reports.append(report)
-    return u, tuple(reports)
+    return solve_loads(
+        system.matrix, system.rhs, system.lift_energies, preconditioner=preconditioner, tolerance=tolerance
+    )
 
 
 def facet_conductivity(
@@ -252,17 +248,9 @@ def facet_conductivity(
     >>> facet_conductivity(links, uniform_material(links, 100.0, 1.0)).tensor.round(2).diagonal()
     array([16.55, 16.55, 16.55])
     """
-    return assemble_tensor(
-        links.packing.box, axes, lambda group: solve_facets(links, material, group, tolerance=tolerance), _wall_flows
+    return effective_tensor(
+        links.packing.box, axes, lambda group: solve_facets(links, material, group, tolerance=tolerance)
     )
-
-
-def _wall_flows(solution: FacetSolution) -> tuple[float, float]:
-    """Heat flow into the spheres at the low wall and out of them at the far wall [W]."""
-    sides = solution.sides
-    at_wall = sides.nodes >= sides.between
-    hot = at_wall & (solution.temperatures[:, 0] == 1.0)
-    return float(solution.heat_flows[hot, 0].sum()), -float(solution.heat_flows[at_wall & ~hot, 0].sum())
 
 
 def low_coordination_warning(links: FacetLinks, material: FacetMaterial) -> str:
