@@ -244,8 +244,9 @@ def sphere_cell_conductivity(
     Notes
     -----
     Against lattice sums, contrast 2 to 1e4 and gaps .1 to .002 R: within .8 % (simple cubic), .6 % (bcc) and .7 %
-    (fcc) with frame 1/1, .5 % with 3/1, from above in nearly all cases. Random packings of density .60: .3 to .6 % (1/1) and
-    .2 to .3 % (3/1) above the finest. Contact disks of 10 degrees with a fluid: within .3 % of finite elements.
+    (fcc) with frame 1/1, .5 % with 3/1, from above in nearly all cases. Random packings of density .60: .3 to .6 %
+    (1/1) and .2 to .3 % (3/1) above the finest. Contact disks of 10 degrees with a fluid: within .3 % of finite
+    elements.
 
     Examples
     --------
