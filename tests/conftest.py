@@ -69,7 +69,7 @@ def made_sweep():
     both; None is a packing that failed. The solid fraction is ``solid(density)``.
     """
     from etc_engine.durable.provenance import this_run
-    from etc_engine.realization import Cell, Realization, Status
+    from etc_engine.realization import Outcome, Realization, Status
     from etc_engine.study.sweep import parse_study
     from etc_engine.sweep.attributes import global_attributes
     from etc_engine.sweep.dataset import assemble
@@ -77,13 +77,13 @@ def made_sweep():
     from etc_engine.sweep.records import Record
     from etc_engine.sweep.table import tabulate
 
-    def cell(value, mean_field: float) -> Cell:
+    def cell(value, mean_field: float) -> Outcome:
         if value is None:
-            return Cell(Status.PACKING_FAILED, "made to fail")
+            return Outcome(Status.PACKING_FAILED, "made to fail")
         tensor = np.full((2, 2), np.nan)
         np.fill_diagonal(tensor, value)
         status = Status.OK if tensor[0, 0] > 0.0 else Status.NOT_PERCOLATING
-        return Cell(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
+        return Outcome(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
 
     def build(text: str, conduct, solid=lambda density: density, mean_field: float = 0.5):
         study = parse_study(text)

@@ -144,12 +144,10 @@ def _changes(transient: Transient) -> dict[str, tuple[Any, Any, str, str]]:
 
 def particle_capacities(transient: Transient) -> NDArray[np.float64]:
     """Heat capacity of each particle, shape (n,) [J/(m K)]; of moving ones that of the whole disk."""
-    system, n = transient.system, transient.network.packing.count
     if transient.trajectory is not None:
         rho_c = np.asarray(transient.study.material.heat_capacity, dtype=np.float64)
         return np.asarray(transient.network.packing.measures * rho_c)
-    rows = system.heat.capacity[system.heat.capacity > 0.0]
-    return np.asarray(rows.reshape(n, -1).sum(axis=1))
+    return transient.system.capacities
 
 
 def check_vtk_series(path: Path, *, overwrite: bool = False) -> None:

@@ -135,7 +135,7 @@ def about(request: Request) -> About:
         packing_methods=list(METHODS),
         size_distributions=list(SHOWN_WORDS),
         conduction_methods={name: list(engine.methods) for name, engine in ENGINES.items()},
-        composite_engines=[name for name, engine in ENGINES.items() if engine.composite],
+        composite_engines=[name for name, engine in ENGINES.items() if not engine.needs_contacts],
     )
 
 

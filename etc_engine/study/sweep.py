@@ -71,7 +71,7 @@ class Study(StudyTable):
         if len(self.packing.box) not in engine.dimensions:
             works = " or ".join(f"{dimension}D" for dimension in engine.dimensions)
             raise ValueError(f"packing.box: engine {word!r} works in {works}, found {list(self.packing.box)}")
-        if engine.composite:
+        if not engine.needs_contacts:
             self._check_composite()
         elif self.composite is not None:
             raise ValueError(f"composite: has no meaning with engine = {word!r}, which conducts through contacts alone")

@@ -153,11 +153,11 @@ class ConductionTable(StudyTable):
     def _default_method(cls, values: Any) -> Any:
         if not isinstance(values, dict) or "method" in values or values.get("engine", "dtem") not in ENGINES:
             return values
-        return {**values, "method": ENGINES[values.get("engine", "dtem")].methods[0]}
+        return {**values, "method": next(iter(ENGINES[values.get("engine", "dtem")].methods))}
 
     @model_validator(mode="after")
     def _check(self) -> ConductionTable:
-        allowed = ENGINES[self.engine].methods
+        allowed = tuple(ENGINES[self.engine].methods)
         for method in self.methods:
             if method not in allowed:
                 raise ValueError(f"method: found {method!r}, allowed with {self.engine}: {', '.join(allowed)}")

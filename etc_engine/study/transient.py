@@ -13,7 +13,7 @@ from pydantic import Field, Tag, ValidationError, model_validator
 
 from etc_engine.errors import InputError, StudyError
 from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable, WallCondition
-from etc_engine.realization.transients import SYSTEMS
+from etc_engine.realization import ENGINES
 from etc_engine.solvers.marching import SCHEMES
 from etc_engine.study.schema import (
     AS_LIST,
@@ -120,6 +120,9 @@ class WallsTable(StudyTable):
         """The conditions by wall."""
         given = {name: getattr(self, name) for name in WallsTable.model_fields}
         return {name: wall.condition() for name, wall in given.items() if wall is not None}
+
+
+SYSTEMS = ("pipe", *(name for name, method in ENGINES["dtem"].methods.items() if method.transient))
 
 
 class Conduction(StudyTable):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from etc_engine.realization import Cell, Realization, RealizationSpec, Status
+from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
 from etc_engine.realization.outcome import uniform_cells
 from etc_engine.sweep.plan import Unit
 
@@ -38,7 +38,7 @@ def failed_realization(error: Exception, spec: RealizationSpec, dimension: int) 
     """The result of a unit that raised: every cell has status ERROR and says why."""
     message = _steady(f"{type(error).__name__}: {error}")
     nowhere = np.full((dimension, dimension), np.nan)
-    cell = Cell(Status.ERROR, message, conductivity=nowhere)
+    cell = Outcome(Status.ERROR, message, conductivity=nowhere)
     return Realization(0, np.nan, np.nan, 0.0, uniform_cells(spec, cell))
 
 
@@ -60,7 +60,7 @@ def decode(line: str) -> Record:
 
     Examples
     --------
-    >>> cell = Cell(Status.OK, conductivity=np.array([[0.1 + 0.2, np.nan], [np.nan, 1.0]]))
+    >>> cell = Outcome(Status.OK, conductivity=np.array([[0.1 + 0.2, np.nan], [np.nan, 1.0]]))
     >>> record = Record(Unit(0.7, 3), Realization(9, 0.7, 0.7, 0.1, ((cell,),)), 0, "node", 1.0, 2.0)
     >>> decode(encode(record)).result.cells[0][0].conductivity[0, 0] == 0.1 + 0.2
     np.True_
@@ -71,19 +71,19 @@ def decode(line: str) -> Record:
     return Record(unit=Unit(*values.pop("unit")), result=Realization(cells=cells, **result), **values)
 
 
-def _plain_cell(cell: Cell) -> dict[str, Any]:
-    values = {field.name: getattr(cell, field.name) for field in fields(Cell)}
+def _plain_cell(cell: Outcome) -> dict[str, Any]:
+    values = {field.name: getattr(cell, field.name) for field in fields(Outcome)}
     values["status"] = int(cell.status)
     values["conductivity"] = np.asarray(cell.conductivity, dtype=np.float64).tolist()
     return values
 
 
-def _cell(values: dict[str, Any]) -> Cell:
+def _cell(values: dict[str, Any]) -> Outcome:
     status, conductivity = (
         Status(values.pop("status")),
         np.array(values.pop("conductivity"), dtype=np.float64),
     )
-    return Cell(status=status, conductivity=conductivity, **values)
+    return Outcome(status=status, conductivity=conductivity, **values)
 
 
 def _plain_scalar(value: object) -> object:

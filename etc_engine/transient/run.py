@@ -13,14 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.box import Box, parse_periodic
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
+from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import value_at
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
 from etc_engine.particle_files.dumps import read_trajectory
 from etc_engine.particle_files.formats import format_to_read, read_particles
 from etc_engine.particle_files.trajectory import Trajectory
-from etc_engine.realization.transients import SYSTEMS, ParticleSystem, Physics, storing_area
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
 from etc_engine.study.transient import Gradient, NetworkStudy, plain, refuse_endless
@@ -139,7 +141,7 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
     """One packing, marched over the output times."""
     packing, column = _particles(study, folder)
     network = _contacts(study, packing)
-    system = SYSTEMS[study.conduction.method](network, _physics(study, packing.count, column))
+    system = _physics(study, packing.count, column).system(network)
     initial = system.initial(_initial(study, packing))
     time = study.time
 
@@ -163,7 +165,7 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
 
 def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
     """All frames of a dump, each with contacts of its own."""
-    motion, method, time = study.motion, study.conduction.method, study.time
+    motion, time = study.motion, study.time
     assert motion is not None
     assert study.particles is not None
     path = folder / study.particles
@@ -177,10 +179,6 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         raise StudyError(f"particles: disks in a box that is periodic along {study.periodic!r} are wanted: {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
 
-    def build(network: ContactNetwork, capacities: NDArray[np.float64]) -> ParticleSystem:
-        heat_capacity = capacities / storing_area(network, method, physics)
-        return SYSTEMS[method](network, replace(physics, heat_capacity=heat_capacity))
-
     def contacts(packing: ParticlePacking) -> ContactNetwork:
         return _contacts(study, packing)
 
@@ -189,9 +187,9 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         return march_trajectory(
             trajectory,
             contacts,
-            build,
+            physics.system,
             _initial(study, first),
-            heat_capacity=physics.heat_capacity,
+            heat_capacity=np.asarray(study.material.heat_capacity, dtype=np.float64),
             expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
             scheme=time.scheme,
             steps=time.steps or 1,
@@ -203,23 +201,46 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     refuse_endless(time, trajectory.times)
     with named_frame(trajectory, 0):
         network = contacts(first)
-        system = SYSTEMS[method](network, physics)
+        system = physics.system(network)
     return _Course(network, system, trajectory.times, marched, MovingState, trajectory)
 
 
-def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> Physics:
+@dataclass(frozen=True, eq=False)
+class _Physics:
+    """What a study says about the particles, besides their contacts, and the system that follows."""
+
+    study: NetworkStudy
+    conductivity: ArrayLike
+    source: Callable[[float], NDArray[np.float64]]
+
+    def system(self, network: ContactNetwork, capacities: NDArray[np.float64] | None = None) -> ParticleSystem:
+        """The system of a contact network, with given heat capacities of the particles or the study's."""
+        conduction = self.study.conduction
+        heat_capacity = np.asarray(self.study.material.heat_capacity, dtype=np.float64)
+        medium = Medium(
+            network.packing,
+            np.asarray(self.conductivity),
+            network.with_resistance(conduction.contact_resistance),
+            heat_capacity=heat_capacity,
+        )
+        pipes = conduction.method == "pipe"
+        return transient_system(
+            medium,
+            self.study.walls.conditions(),
+            engine="pipe" if pipes else "dtem",
+            method=conduction.pipe_resistance or "chord" if pipes else conduction.method,
+            source=self.source,
+            capacities=capacities,
+            **({"dipoles": True} if conduction.dipoles else {}),
+        )
+
+
+def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> _Physics:
     given = study.conduction.conductivity
     if given is not None and column is not None:
         raise StudyError(f"conduction.conductivity: {study.particles} has a column of that name, take one of them out")
-    return Physics(
-        conductivity=column if column is not None else 1.0 if given is None else given,
-        heat_capacity=np.asarray(study.material.heat_capacity, dtype=np.float64),
-        contact_resistance=study.conduction.contact_resistance,
-        walls=study.walls.conditions(),
-        source=_source(study, count),
-        pipe_resistance=study.conduction.pipe_resistance or "chord",
-        dipoles=study.conduction.dipoles,
-    )
+    conductivity = column if column is not None else 1.0 if given is None else given
+    return _Physics(study, conductivity, _source(study, count))
 
 
 def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:

@@ -13,7 +13,7 @@ from etc_engine.box import Box
 from etc_engine.durable.files import write_atomically
 from etc_engine.errors import OutputError
 from etc_engine.packing import PackingSpec, parse_radii
-from etc_engine.realization import Cell, ConductionSpec, ContactSpec, Realization, RealizationSpec, Status
+from etc_engine.realization import ConductionSpec, ContactSpec, Outcome, Realization, RealizationSpec, Status
 from etc_engine.study.sweep import parse_study
 from etc_engine.sweep import gathering
 from etc_engine.sweep.plan import Unit
@@ -24,7 +24,7 @@ from etc_engine.sweep.table import join, tabulate
 
 
 def record(realization: int, value: float = 0.3, message: str = "") -> Record:
-    cell = Cell(Status.OK, message, np.array([[value, np.nan], [np.nan, -value]]), 5, 2, 3.3, 7, 9, 1e-12, 0.5)
+    cell = Outcome(Status.OK, message, np.array([[value, np.nan], [np.nan, -value]]), 5, 2, 3.3, 7, 9, 1e-12, 0.5)
     result = Realization(11, 0.7, 0.69, 0.25, ((cell, cell), (cell, cell)))
     return Record(Unit(0.7, realization), result, 3, "node", 1.5, 2.5)
 
@@ -70,7 +70,7 @@ def test_a_record_keeps_every_bit(value, message):
 
 
 def test_numpy_numbers_of_an_engine_become_plain():
-    cell = Cell(Status.OK, conductivity=np.eye(2), contacts=np.int64(3), coordination=np.float64(1.5))
+    cell = Outcome(Status.OK, conductivity=np.eye(2), contacts=np.int64(3), coordination=np.float64(1.5))
     there = Record(Unit(None, 0), Realization(np.int64(2), 0.5, 0.5, 0.0, ((cell,),)), 0, "node", 0.0, 0.0)
     back = decode(encode(there))
     assert back.unit == Unit(None, 0)

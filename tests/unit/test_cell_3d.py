@@ -289,7 +289,7 @@ def test_heat_and_temperatures_between_walls():
     centers, radii = few_spheres()
     model = cells(centers, radii, Box((1.0, 1.0, 1.0)), 40.0)
     solution = solve_sphere_cells(model, (2,))
-    heat_in, heat_out = solution.wall_flows
+    heat_in, heat_out = solution.wall_heat()
     assert heat_in == pytest.approx(heat_out, rel=1e-6)
     assert heat_in == pytest.approx(solution.energies[0, 0], rel=1e-6)
     temperatures = solution.sphere_temperatures[:, 0]

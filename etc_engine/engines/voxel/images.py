@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.engines.voxel.cell import CellSolution, solve_cell
+from etc_engine.engines.voxel.cell import CellSolution, Scheme, solve_cell
 from etc_engine.errors import ConvergenceError, InputError
 
 LARGEST_REFINED = 8_000_000
@@ -73,7 +73,7 @@ def homogenize_image(
     lengths : tuple of float [m]
         Edges of the image.
     boundary, solver, tolerance, threads
-        As in `etc_engine.engines.voxel.cell.solve_cell`.
+        As in `etc_engine.engines.voxel.cell.solve_cell` and `etc_engine.engines.voxel.cell.Scheme`.
 
     Returns
     -------
@@ -102,16 +102,8 @@ def homogenize_image(
     conductivity = image_conductivity(labels, phases)
 
     def solve(values: NDArray[np.float64], green: str, limit: int = 5000) -> CellSolution:
-        return solve_cell(
-            values,
-            lengths,
-            boundary=boundary,
-            solver=solver,
-            green=green,
-            tolerance=tolerance,
-            threads=threads,
-            limit=limit,
-        )
+        scheme = Scheme(solver, green, tolerance, threads, limit)
+        return solve_cell(values, lengths, boundary=boundary, scheme=scheme)
 
     found = solve(conductivity, "rotated")
     if not np.diag(found.tensor).any():

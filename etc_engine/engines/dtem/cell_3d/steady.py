@@ -17,16 +17,16 @@ from etc_engine.engines.dtem.cell_3d.plan import Fineness
 from etc_engine.engines.dtem.cell_3d.system import (
     apply_cells,
     cell_loads,
-    cell_preconditioner,
     fixed_unknowns,
-    solve_load,
+    solve_cells,
     wall_facets,
 )
 from etc_engine.engines.dtem.cell_3d.topology import cell_topology
 from etc_engine.errors import GeometryError
 from etc_engine.medium.backbone import Backbone
-from etc_engine.medium.conductivity import EffectiveConductivity, assemble_tensor
+from etc_engine.medium.conductivity import EffectiveConductivity, effective_tensor
 from etc_engine.medium.facets import FacetLinks
+from etc_engine.medium.loads import driven_walls
 from etc_engine.solvers import SolveReport
 from etc_engine.structure.laguerre_polygons import LaguerrePolygons, laguerre_polygons
 
@@ -68,7 +68,7 @@ class SphereCellSolution:
         Temperatures at the unknowns of the frame, less the linear field.
     energies : ndarray, shape (k, k)
         sum_p t_pa . K_p t_pb.
-    wall_flows : tuple of float [W]
+    flows : tuple of float [W]
         Heat in at the low wall and out at the far one; 0 along periodic axes.
     reports : tuple of SolveReport
         One per load.
@@ -78,17 +78,20 @@ class SphereCellSolution:
     axes: tuple[int, ...]
     fluctuations: Floats
     energies: Floats
-    wall_flows: tuple[float, float]
+    flows: tuple[float, float]
     reports: tuple[SolveReport, ...]
 
     @property
     def backbone(self) -> Backbone:
         """Everything takes part: a fluid leaves no dead ends."""
         links = self.cells.links
-        walled = not links.packing.box.periodic[self.axes[0]]
-        driven = (links.walls // 2 == self.axes[0]) & walled
+        driven = driven_walls(links, self.axes)
         clusters = np.zeros(links.packing.count, dtype=np.int64)
         return Backbone(np.ones(links.count, dtype=np.bool_), driven, clusters, (True,) * len(self.axes))
+
+    def wall_heat(self) -> tuple[float, float]:
+        """Heat flow in at the low wall and out at the far one [W]."""
+        return self.flows
 
     @property
     def sphere_temperatures(self) -> Floats:
@@ -195,12 +198,8 @@ def solve_sphere_cells(cells: SphereCells, axes: tuple[int, ...], *, tolerance: 
     load, energy = cell_loads(system)
     periodic = box.periodic[axes[0]]
     fixed = fixed_unknowns(system, axes[0], periodic)
-    preconditioner = cell_preconditioner(system, fixed)
-    solutions = [
-        solve_load(system, fixed, load[:, axis], float(energy[axis, axis]), preconditioner, tolerance) for axis in axes
-    ]
-    u = np.array([values for values, _ in solutions]).T
     own = load[:, list(axes)]
+    u, reports = solve_cells(system, fixed, own, energy.diagonal()[list(axes)], tolerance)
     applied = np.array([apply_cells(system, values) for values in u.T]).T
     mixed = u.T @ own
     energies = energy[np.ix_(axes, axes)] + mixed + mixed.T + u.T @ applied
@@ -210,7 +209,7 @@ def solve_sphere_cells(cells: SphereCells, axes: tuple[int, ...], *, tolerance: 
         heat = (own[:, 0] + applied[:, 0]) / length
         flows = (-_at_wall(system, 2 * axes[0], heat), _at_wall(system, 2 * axes[0] + 1, heat))
         u, energies = -u / length, energies / length**2
-    return SphereCellSolution(cells, axes, u, energies, flows, tuple(report for _, report in solutions))
+    return SphereCellSolution(cells, axes, u, energies, flows, reports)
 
 
 def _at_wall(system: CellSystem, wall: int, heat: Floats) -> float:
@@ -261,9 +260,8 @@ def sphere_cell_conductivity(
     >>> sphere_cell_conductivity(cells).tensor.round(2).diagonal()
     array([2.71, 2.71, 2.71])
     """
-    return assemble_tensor(
+    return effective_tensor(
         cells.links.packing.box,
         axes,
         lambda group: solve_sphere_cells(cells, group, tolerance=tolerance),
-        lambda solution: solution.wall_flows,
     )

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import LinearOperator
 
 from etc_engine.engines.dtem.cell_3d.cells import CellSystem
-from etc_engine.solvers import Preconditioner, SolveReport, build_preconditioner, solve_energy
+from etc_engine.solvers import Limits, Preconditioner, SolveReport, build_preconditioner, solve_loads
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -183,33 +183,47 @@ def cell_loads(system: CellSystem) -> tuple[Floats, Floats]:
     return load, energy
 
 
-def solve_load(
+def solve_cells(
     system: CellSystem,
     fixed: NDArray[np.bool_],
-    load: Floats,
-    lift_energy: float,
-    preconditioner: Preconditioner,
+    loads: Floats,
+    lift_energies: Floats,
     tolerance: float,
-) -> tuple[Floats, SolveReport]:
-    """Minimize lift_energy + 2 load.u + u.K u over the unknowns that are not fixed, where u = 0.
+) -> tuple[Floats, tuple[SolveReport, ...]]:
+    """Minimize lift_energy + 2 load.u + u.K u for every load, over the unknowns that are not fixed (u = 0 there).
+
+    Parameters
+    ----------
+    system : CellSystem
+    fixed : ndarray of bool, shape (size,)
+    loads : ndarray, shape (size, k)
+    lift_energies : ndarray, shape (k,)
+    tolerance : float
+        Relative error of the energies.
+
+    Returns
+    -------
+    u : ndarray, shape (size, k)
+    reports : tuple of SolveReport
 
     Raises
     ------
     ConvergenceError
-        If the relative error of the energy does not fall to the tolerance.
+        If the relative error of an energy does not fall to the tolerance.
     """
     if fixed.all():
-        return np.zeros(system.size), SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return np.zeros_like(loads), (SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0),) * loads.shape[1]
 
     def free_part(values: Floats) -> Floats:
         return np.where(fixed, values, apply_cells(system, np.where(fixed, 0.0, values)))
 
-    return solve_energy(
+    u, reports = solve_loads(
         LinearOperator((system.size, system.size), matvec=free_part, dtype=np.float64),
-        np.where(fixed, 0.0, -load),
-        lift_energy,
-        preconditioner=preconditioner,
+        np.where(fixed[:, None], 0.0, -loads),
+        lift_energies,
+        preconditioner=cell_preconditioner(system, fixed),
         tolerance=tolerance,
-        max_iterations=MOST_ITERATIONS,
+        limits=Limits(max_iterations=MOST_ITERATIONS),
         conserved=np.where(~fixed & (np.arange(system.size) < system.vertices), 1.0, 0.0),
     )
+    return u, reports
