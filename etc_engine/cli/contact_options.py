@@ -13,7 +13,6 @@ import click
 from etc_engine.errors import InputError
 
 if TYPE_CHECKING:
-    from etc_engine.laws.contact import Elastic
     from etc_engine.medium.network import ContactNetwork
     from etc_engine.particle_files.table import ParticleTable
 
@@ -32,8 +31,6 @@ OPTIONS = (
         "--contact-columns",
         help="Words of the dump's compute pair/gran/local, such as 'pos id force contactArea heatFlux'.",
     ),
-    click.option("--youngs-modulus", type=float, help="Of the particles [Pa], with --contact-width force."),
-    click.option("--poisson-ratio", type=float, help="Of the particles, with --contact-width force."),
 )
 
 
@@ -44,37 +41,22 @@ class ContactWords:
     contacts: Path | None = None
     contact_width: str | None = None
     contact_columns: str | None = None
-    youngs_modulus: float | None = None
-    poisson_ratio: float | None = None
 
-    def material(self) -> Elastic | None:
-        """Elastic constants, where both are given.
-
-        Raises
-        ------
-        InputError
-        """
-        from etc_engine.laws.contact import Elastic
-
-        if (self.youngs_modulus is None) != (self.poisson_ratio is None):
-            raise InputError("--youngs-modulus and --poisson-ratio are only valid together")
-        if self.youngs_modulus is None or self.poisson_ratio is None:
-            return None
-        return Elastic(self.youngs_modulus, self.poisson_ratio)
-
-    def network(self, table: ParticleTable, frame: int | None) -> ContactNetwork | None:
-        """Contacts of the dump; None where none is given.
+    def network(
+        self, table: ParticleTable, frame: int | None, youngs_modulus: float | None, poisson_ratio: float | None
+    ) -> ContactNetwork | None:
+        """Contacts of the dump; None where none is given. The elastic constants are needed by widths from forces.
 
         Raises
         ------
         InputError, GeometryError
         """
+        from etc_engine.laws.contact import Elastic
         from etc_engine.medium.given_contacts import given_contacts, reach_of_contacts
         from etc_engine.particle_files.contact_dumps import contact_rows, read_contacts
 
-        material = self.material()
         if self.contacts is None:
-            unused = [name for name in ("contact_width", "contact_columns", "youngs_modulus") if getattr(self, name)]
+            unused = [name for name in ("contact_width", "contact_columns") if getattr(self, name)]
             if unused:
                 raise InputError(f"--{unused[0].replace('_', '-')} is only valid with --contacts")
             return None
@@ -88,6 +70,9 @@ class ContactWords:
         else:
             word = "force_normal" if "force_normal" in found.columns else "force"
             values = {"force": found.column(word)[known]}
+        material = None
+        if youngs_modulus is not None and poisson_ratio is not None:
+            material = Elastic(youngs_modulus, poisson_ratio)
         reach = reach_of_contacts(table.packing, rows[known], **values, material=material)
         own = ", as the run made it with its own stiffness" if width == "area" else ""
         said = f"{int(known.sum())} contacts from {self.contacts}, their widths from the {width}{own}"

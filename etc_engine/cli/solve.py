@@ -20,6 +20,7 @@ from etc_engine.cli.particle_options import (
     warn_of_excess,
     warn_of_sample,
 )
+from etc_engine.cli.physics_options import PhysicsWords, physics_options
 
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
@@ -55,6 +56,7 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
     show_default=True,
     help="Conductivity of what fills the pores [W/(m K)].",
 )
+@physics_options
 @click.option(
     "--contact-resistance",
     type=float,
@@ -87,6 +89,8 @@ def solve_command(
     periodic along it.
     """
     start = time.perf_counter()
+    import numpy as np
+
     from etc_engine.cli.options import print_json
     from etc_engine.realization import field_along, find_engine
 
@@ -96,7 +100,8 @@ def solve_command(
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
     table = read_sample(particles, words)
-    medium = asked.medium(table, particles, dumped.network(table, words.frame))
+    elastic = asked.physics.youngs_modulus, asked.physics.poisson_ratio
+    medium = asked.medium(table, particles, dumped.network(table, words.frame, *elastic))
     axes = _load_axes(asked.axis, medium)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
@@ -109,7 +114,7 @@ def solve_command(
     if dumped.contacts is None:
         warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
     warn_of_sample(table, [axis for axis in axes if not medium.box.periodic[axis]], gap)
-    warn_of_excess(result.tensor, medium.conductivity)
+    warn_of_excess(result.tensor, np.append(medium.conductivity, medium.pores.conductivity))
     _write(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
     if not full:
@@ -134,6 +139,7 @@ class _Asked:
     conductivity: float | None
     pore_conductivity: float
     contact_resistance: float
+    physics: PhysicsWords
 
     def refuse_old_words(self) -> None:
         """Refuse spellings of earlier versions, and options that mean nothing together."""
@@ -142,8 +148,10 @@ class _Asked:
         if self.method == "pipe" or self.pipe_resistance is not None:
             found = "--method pipe" if self.method == "pipe" else f"--pipe-resistance {self.pipe_resistance}"
             raise InputError(f"{found} is now --engine pipe --method {self.pipe_resistance or 'chord'}")
-        if self.contact_angle is None and self.bond_gap != BOND_GAP:
+        if self.contact_angle is None and self.bond_gap != BOND_GAP and self.physics.contact_rule != "load":
             raise InputError("--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap")
+        if self.contact_resistance > 0.0 and self.physics.roughness is not None:
+            raise InputError("--contact-resistance and --roughness both resist at contacts: leave one of them out")
 
     def medium(self, table: ParticleTable, particles: Path, dumped: ContactNetwork | None) -> Medium:
         """The particles of a file with contacts, those of a contact dump if there is one, and materials."""
@@ -152,23 +160,26 @@ class _Asked:
         import numpy as np
 
         from etc_engine.errors import InputError
-        from etc_engine.medium.medium import Medium, Pores
-        from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+        from etc_engine.medium.medium import Medium
 
+        if self.conductivity is not None and self.physics.material is not None:
+            raise InputError("--material and --conductivity both say what the particles are: leave one of them out")
         if self.conductivity is not None and table.conductivity is not None:
             raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
-        given = 1.0 if self.conductivity is None else self.conductivity
-        if dumped is not None:
-            network = dumped
-            if self.contact_angle is not None:
-                raise InputError("--contact-angle and --contacts both say how wide contacts are: give one of them")
-        elif self.contact_angle is None:
-            network = overlap_contacts(table.packing)
-        else:
-            network = bonded_contacts(table.packing, radians(self.contact_angle), self.bond_gap)
-        network = network.with_resistance(self.contact_resistance)
+        if dumped is not None and (self.contact_angle is not None or self.physics.contact_rule is not None):
+            raise InputError(
+                "--contacts and --contact-angle or --rule both say how wide contacts are: give one of them"
+            )
+        solid = self.physics.solid() if self.conductivity is None else self.conductivity
+        given = 1.0 if solid is None else solid
         kappa = np.asarray(given if table.conductivity is None else table.conductivity)
-        return Medium(table.packing, kappa, network, Pores(self.pore_conductivity))
+        half_angle = None if self.contact_angle is None else radians(self.contact_angle)
+        network = dumped or self.physics.network(table.packing, half_angle, self.bond_gap)
+        pores = self.physics.pores(table.packing, self.pore_conductivity)
+        if self.contact_resistance > 0.0 or self.physics.roughness is None:
+            network = network.with_resistance(self.contact_resistance)
+        network = self.physics.roughened(network, kappa, pores)
+        return Medium(table.packing, kappa, network, pores)
 
     def solve(self, medium: Medium, engine: Engine, method: str, axes: tuple[int, ...]) -> EffectiveConductivity[Any]:
         """The conductivity along the axes."""
@@ -304,6 +315,8 @@ def _record(
         "density": medium.packing.density,
         "fill_height": find_filling(medium.packing).fill_height,
         "pore_conductivity": medium.pores.conductivity,
+        "contact_rule": network.rule,
+        **asked.physics.record,
         "contacts": int(np.count_nonzero(network.angles[:, 0])),
         "links": network.count,
         "wall_contacts": len(network.walls_of(axis)),

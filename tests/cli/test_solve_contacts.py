@@ -57,8 +57,8 @@ def test_forces_take_elastic_constants(etc_engine, files):
     ("options", "words"),
     [
         (("--contact-width", "area"), "--contact-width is only valid with --contacts"),
-        (("--youngs-modulus", 1e9), "only valid together"),
         (("--contacts", "c.dump", "--contact-angle", 5), "give one of them"),
+        (("--contacts", "c.dump", "--rule", "overlap"), "give one of them"),
         (("--contacts", "p.dump"), "no dump of contacts"),
         (("--contacts", "c.dump", "--contact-columns", "id force"), "makes 6"),
     ],
