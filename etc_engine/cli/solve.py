@@ -167,9 +167,7 @@ class _Asked:
         if self.conductivity is not None and table.conductivity is not None:
             raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
         if dumped is not None and (self.contact_angle is not None or self.physics.contact_rule is not None):
-            raise InputError(
-                "--contacts and --contact-angle or --rule say how wide contacts are: give one of them"
-            )
+            raise InputError("--contacts and --contact-angle or --rule say how wide contacts are: give one of them")
         solid = self.physics.solid() if self.conductivity is None else self.conductivity
         given = 1.0 if solid is None else solid
         kappa = np.asarray(given if table.conductivity is None else table.conductivity)
