@@ -165,18 +165,38 @@ def solve_facets(
     Conjugate gradients, preconditioned by the elements as stars (`etc_engine.solvers.star`): 2 to 20 iterations.
     """
     sides = facet_sides(links, driven_facets(links, axes), bool((material.open_fluid > 0.0).all()))
+    return solve_sides(links, material, axes, sides, tolerance=tolerance)[0]
+
+
+def solve_sides(
+    links: FacetLinks,
+    material: FacetMaterial,
+    axes: tuple[int, ...],
+    sides: FacetSides,
+    *,
+    tolerance: float = 1e-10,
+    nearby: FacetSolution | None = None,
+) -> tuple[FacetSolution, Elements]:
+    """`solve_facets` on known sides, with its elements; starts from the solution of a similar material on them."""
     starts, resistances = facet_resistances(links, material, sides)
     elements = facet_elements(sides, starts, resistances)
-    system = assemble(elements, *_prescribe(links, sides, axes))
-    u, reports = _solve(system, elements, resistances, tolerance)
+    lift, prescribed = lift_and_prescribed(links, sides, axes)
+    system = assemble(elements, lift, prescribed)
+    rows = system.free[elements.nodes]
+    initial = np.zeros(system.rhs.shape)
+    if nearby is not None:
+        initial[rows[rows >= 0]] = (nearby.temperatures - lift)[rows >= 0]
+    u, reports = _solve(system, elements, resistances, initial, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
-    return FacetSolution(
-        links, axes, sides, material, (starts, resistances), temperatures, flows, temperatures.T @ flows, reports
+    energies = temperatures.T @ flows
+    solution = FacetSolution(
+        links, axes, sides, material, (starts, resistances), temperatures, flows, energies, reports
     )
+    return solution, elements
 
 
-def _prescribe(
+def lift_and_prescribed(
     links: FacetLinks, sides: FacetSides, axes: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Lift and prescribed nodes: the driven walls, or the jumps of periodic axes and one pinned node."""
@@ -192,7 +212,11 @@ def _prescribe(
 
 
 def _solve(
-    system: LinearSystem, elements: Elements, resistances: NDArray[np.float64], tolerance: float
+    system: LinearSystem,
+    elements: Elements,
+    resistances: NDArray[np.float64],
+    initial: NDArray[np.float64],
+    tolerance: float,
 ) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
     """Free temperatures of all loads."""
     size = system.matrix.shape[0]
@@ -213,6 +237,7 @@ def _solve(
             np.ascontiguousarray(system.rhs[:, load]),
             float(lift_energy),
             preconditioner=preconditioner,
+            initial=np.ascontiguousarray(initial[:, load]),
             tolerance=tolerance,
         )
         reports.append(report)
