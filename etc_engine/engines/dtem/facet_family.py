@@ -31,8 +31,9 @@ from etc_engine.engines.dtem.facet_elements import (
     facet_sides,
     sample_sides,
 )
-from etc_engine.engines.dtem.facet_steady import FacetSolution, driven_facets, lift_and_prescribed, solve_sides
+from etc_engine.engines.dtem.facet_steady import FacetSolution, lift_and_prescribed, solve_sides
 from etc_engine.medium.facets import FacetLinks
+from etc_engine.medium.loads import driven_walls
 
 SAMPLE = 48
 """Spheres of the sample."""
@@ -104,7 +105,7 @@ def solve_family(
     for columns in (True, False):  # without a fluid there are no columns, and fewer nodes
         rows = [row for row, m in enumerate(materials) if bool((m.open_fluid > 0.0).all()) is columns]
         if rows:
-            sides = facet_sides(links, driven_facets(links, axes), columns)
+            sides = facet_sides(links, driven_walls(links, axes), columns)
             found = _solve_alike(links, [materials[row] for row in rows], axes, sides, (tolerance, accuracy))
             members.update(zip(rows, found, strict=True))
     return [members[row] for row in range(len(materials))]
