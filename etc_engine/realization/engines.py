@@ -52,6 +52,8 @@ class Method:
         Whether it has a transient form.
     options : tuple of str
         Options of the engine that it heeds.
+    gas : bool
+        Whether it takes rarefied gas and radiation between the particles.
     """
 
     description: str
@@ -60,6 +62,7 @@ class Method:
     pores: str = NO
     transient: bool = False
     options: tuple[str, ...] = ()
+    gas: bool = False
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,13 @@ class Engine:
             able = [name for name, other in self.methods.items() if other.pores != NO]
             cure = f"use {' or '.join(able)}" if able else "use another engine, or pores that do not conduct"
             raise InputError(f"method {method} of engine {self.name} takes no heat through the pores: {cure}")
+        if not row.gas and not medium.pores.plain:
+            able = [name for name, other in self.methods.items() if other.gas]
+            cure = f"use {' or '.join(able)}" if able else "use another engine, or a continuum without radiation"
+            raise InputError(
+                f"method {method} of engine {self.name} takes neither the temperature jumps of a rarefied gas nor "
+                f"radiation: {cure}"
+            )
         if row.pores == MUST and not medium.pores.conduct:
             raise InputError(f"method {method} of engine {self.name} is only valid with pores that conduct")
 
