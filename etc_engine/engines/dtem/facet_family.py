@@ -73,7 +73,7 @@ def solve_family(
     axes: tuple[int, ...],
     *,
     tolerance: float = 1e-10,
-    accuracy: float = 5e-4,
+    accuracy: float = 2e-4,
 ) -> list[FamilyMember]:
     """Energies of all materials, in order.
 
@@ -129,19 +129,20 @@ def _solve_alike(
             last, own = solve_sides(links, materials[row], axes, sides, tolerance=limits[0], nearby=last)
             solutions[row] = last
         else:
-            own = facet_elements(sides, *facet_resistances(links, materials[row], sides))
+            own = facet_elements(sides, facet_resistances(links, materials[row], sides))
         elements.append(own)
     found = {row: FamilyMember(s.energies, 0.0, s, len(anchors)) for row, s in solutions.items()}
     if len(found) < len(materials):
         lift = lift_and_prescribed(links, sides, axes)[0]
         products = _reduced_products(lift, list(solutions.values()), elements)
+        floor = 0.01 * float(misfit.max())  # a fit to the sample does not fit all the others as closely
         for row in range(len(materials)):
             if row not in found:
                 mixed = np.tensordot(coefficients[:, row], products, axes=1)
                 energies = _least_energy(mixed, len(axes), mixed.shape[0])
                 fewer = _least_energy(mixed, len(axes), mixed.shape[0] - len(axes))
                 apart = float(np.abs(fewer - energies).max() / np.abs(energies).max())
-                found[row] = FamilyMember(energies, max(float(misfit[row]), apart), None, len(anchors))
+                found[row] = FamilyMember(energies, max(float(misfit[row]), floor, apart), None, len(anchors))
     return [found[row] for row in range(len(materials))]
 
 
@@ -158,7 +159,7 @@ def _choose_anchors(
         return everyone
     sample = sample_sides(sides, np.linspace(0, spheres - 1, SAMPLE).astype(np.int64))
     samples = np.array(
-        [facet_elements(sample, *facet_resistances(links, material, sample)).values for material in materials]
+        [facet_elements(sample, facet_resistances(links, material, sample)).values for material in materials]
     ).T
     norms = np.linalg.norm(samples, axis=0)
     matrix = samples / norms

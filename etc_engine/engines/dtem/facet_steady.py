@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.engines.dtem.assembly import LinearSystem, assemble
-from etc_engine.engines.dtem.element import Elements
+from etc_engine.engines.dtem.element import Elements, Resistances
 from etc_engine.engines.dtem.facet_elements import (
     SMALL_FACET,
     FacetMaterial,
@@ -44,8 +44,8 @@ class FacetSolution:
         temperature gradient of 1 along a periodic axis.
     sides : FacetSides
     material : FacetMaterial
-    resistances : (ndarray, ndarray)
-        Matrices H of all spheres, packed as (starts, values) [K/W].
+    resistances : Resistances
+        Matrices H of all spheres.
     temperatures : ndarray, shape (s, k) [K]
         Node temperature at each side; along a periodic axis measured from the mean gradient at the sphere's centre.
     heat_flows : ndarray, shape (s, k) [W]
@@ -59,7 +59,7 @@ class FacetSolution:
     axes: tuple[int, ...]
     sides: FacetSides
     material: FacetMaterial
-    resistances: tuple[NDArray[np.int64], NDArray[np.float64]]
+    resistances: Resistances
     temperatures: NDArray[np.float64]
     heat_flows: NDArray[np.float64]
     energies: NDArray[np.float64]
@@ -81,7 +81,7 @@ class FacetSolution:
     @cached_property
     def sphere_temperatures(self) -> NDArray[np.float64]:
         """Mean temperature of every sphere, T_o = T_i - sum_j H_ij Q_j of its first facet, shape (n, k) [K]."""
-        starts, values = self.resistances
+        starts, values = self.resistances.starts, self.resistances.values
         sizes = np.diff(self.sides.offsets)
         first_row = np.repeat(starts[:-1] - self.sides.offsets[:-1], sizes) + np.arange(self.sides.nodes.size)
         rise = values[first_row, None] * self.heat_flows
@@ -174,21 +174,19 @@ def solve_sides(
     nearby: FacetSolution | None = None,
 ) -> tuple[FacetSolution, Elements]:
     """`solve_facets` on known sides, with its elements; starts from the solution of a similar material on them."""
-    starts, resistances = facet_resistances(links, material, sides)
-    elements = facet_elements(sides, starts, resistances)
+    h = facet_resistances(links, material, sides)
+    elements = facet_elements(sides, h)
     lift, prescribed = lift_and_prescribed(links, sides, axes)
     system = assemble(elements, lift, prescribed)
     rows = system.free[elements.nodes]
     initial = np.zeros(system.rhs.shape)
     if nearby is not None:
         initial[rows[rows >= 0]] = (nearby.temperatures - lift)[rows >= 0]
-    u, reports = _solve(system, elements, resistances, initial, tolerance)
+    u, reports = _solve(system, elements, h.values, initial, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
     energies = temperatures.T @ flows
-    solution = FacetSolution(
-        links, axes, sides, material, (starts, resistances), temperatures, flows, energies, reports
-    )
+    solution = FacetSolution(links, axes, sides, material, h, temperatures, flows, energies, reports)
     return solution, elements
 
 
