@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from etc_engine.realization import Engine
 
 BOND_GAP = 1e-6
+ESTIMATED = 5_000
+"""Up to so many particles the discretization error is estimated where a method can; it takes three times as long."""
 
 
 @click.command("solve")
@@ -36,9 +38,14 @@ BOND_GAP = 1e-6
 @particle_options
 @click.option("--axis", help="Load axis: x (the default), y, z or all.")
 @click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
-@click.option("--method", help="Of dtem: chord, standard, enhanced, arc or exact; of pipe: chord or uniform.")
+@click.option(
+    "--method",
+    help="Of dtem: chord, standard, enhanced, arc, exact, or cell where the pores conduct; of pipe: chord or uniform.",
+)
 @click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
+@click.option("--degree", type=int, help="Polynomial degree on the edges of cells, with --method cell: 1 to 5.")
+@click.option("--bounds", is_flag=True, help="Rigorous bounds too, with --method cell and few disks.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
 )
@@ -98,11 +105,13 @@ def solve_command(
     record = _record(asked, method, result, field, axes)
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
-    _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
+    if not medium.pores.conduct:
+        _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
     gap = 0.0 if asked.contact_angle is None else asked.bond_gap
     warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
-    warn_of_sample(table, [axis for axis in axes if not medium.box.periodic[axis]], gap)
-    warn_of_excess(result.tensor, medium.conductivity)
+    driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
+    warn_of_sample(table, driven, gap)
+    warn_of_excess(result.tensor, [*medium.conductivity, medium.pores.conductivity])
     _write(outputs, field, record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
@@ -120,6 +129,8 @@ class _Asked:
     method: str | None
     pipe_resistance: str | None
     modes: int | None
+    degree: int | None
+    bounds: bool
     contact_angle: float | None
     bond_gap: float
     conductivity: float | None
@@ -164,7 +175,10 @@ class _Asked:
 
         if not engine.needs_contacts:
             raise InputError(f"engine {engine.name} resolves the pores: use the command homogenize")
-        options = {} if self.modes is None else {"modes": self.modes}
+        given = {"modes": self.modes, "degree": self.degree, "bounds": self.bounds or None}
+        options = {name: value for name, value in given.items() if value is not None}
+        if "error_estimate" in engine.find_method(method).options and medium.packing.count <= ESTIMATED:
+            options["error_estimate"] = True
         return effective_conductivity(medium, engine=engine.name, method=method, axes=axes, **options)
 
 
@@ -286,7 +300,7 @@ def _record(
         "pore_conductivity": medium.pores.conductivity,
         "contacts": int(np.count_nonzero(network.angles[:, 0])),
         "links": network.count,
-        "wall_contacts": len(network.walls_of(axis)),
+        "wall_contacts": int(np.count_nonzero(network.wall_angles[network.walls_of(axis)])),
         "unknowns": result.unknowns,
         "percolates": percolates,
         "status": int(Status.OK if percolates else Status.NOT_PERCOLATING),

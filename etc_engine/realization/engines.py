@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from etc_engine.box import AXES
-from etc_engine.engines.dtem import conductivity as dtem
-from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem import families as dtem
 from etc_engine.engines.dtem.methods import dimensions_of
-from etc_engine.engines.dtem.transient import element_system
 from etc_engine.engines.lattice import homogenize as lattice
 from etc_engine.engines.pipe import steady as pipe
 from etc_engine.engines.pipe.field import pipe_field
@@ -25,7 +23,19 @@ from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.transient import ParticleSystem
-from etc_engine.realization.options import ANGLE_CURVE, BOUNDARY, DIPOLES, GREEN, MODES, Option, whole_number, word_of
+from etc_engine.realization.options import (
+    ANGLE_CURVE,
+    BOUNDARY,
+    BOUNDS,
+    DEGREE,
+    DIPOLES,
+    ERROR_ESTIMATE,
+    GREEN,
+    MODES,
+    Option,
+    whole_number,
+    word_of,
+)
 from etc_engine.realization.outcome import Outcome, outcome_of
 
 NO, MAY, MUST = "no", "may", "must"
@@ -270,12 +280,26 @@ ENGINES: Mapping[str, Engine] = {
                     dimensions_of("exact"),
                     options=("modes",),
                 ),
+                "cell": Method(
+                    "Laguerre cells: disks and the fluid between them",
+                    (2,),
+                    pores=MUST,
+                    transient=True,
+                    options=("degree", "error_estimate", "bounds"),
+                ),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
-            {"modes": MODES, "angle_curve": ANGLE_CURVE, "dipoles": DIPOLES},
-            system=element_system,
-            recover=lambda _, __, solution, load: recover_field(solution, load),
-            remarks=dtem.accuracy_remarks,
+            {
+                "modes": MODES,
+                "angle_curve": ANGLE_CURVE,
+                "dipoles": DIPOLES,
+                "degree": DEGREE,
+                "error_estimate": ERROR_ESTIMATE,
+                "bounds": BOUNDS,
+            },
+            system=dtem.system_of,
+            recover=dtem.field_of,
+            remarks=dtem.remarks_on,
         ),
         Engine(
             "pipe",
