@@ -34,7 +34,7 @@ def disks(tmp_path):
 
 
 def test_the_published_assembly_as_json():
-    command = [sys.executable, "-m", "etc_engine", "solve", str(TABLE_2), "--box", "1,1", "--json"]
+    command = [sys.executable, "-m", "etc_engine", "solve", str(TABLE_2), "--box", "1,1", "--json", "--full"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert done.stderr == ""
