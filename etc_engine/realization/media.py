@@ -75,9 +75,7 @@ def _roughened(
     network: ContactNetwork, values: Values, conductivity: NDArray[np.float64], pores: Pores
 ) -> ContactNetwork:
     """The contacts with the area resistance of rough surfaces."""
-    roughness = Roughness(
-        values["roughness_height"], values["roughness_slope"], hardness=values["roughness_hardness"]
-    )
+    roughness = Roughness(values["roughness_height"], values["roughness_slope"], hardness=values["roughness_hardness"])
     stiffness = Stiffness(
         values["youngs_modulus"],
         values["poisson_ratio"],

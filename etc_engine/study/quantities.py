@@ -146,9 +146,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             POSITIVE,
         ),
         Quantity("contacts.poisson_ratio", "1", "Poisson's ratio of the particles", "contacts", Poisson, POISSON),
-        Quantity(
-            "contacts.wall_youngs_modulus", "Pa", "Young's modulus of the walls", "contacts", Positive, POSITIVE
-        ),
+        Quantity("contacts.wall_youngs_modulus", "Pa", "Young's modulus of the walls", "contacts", Positive, POSITIVE),
         Quantity("contacts.wall_poisson_ratio", "1", "Poisson's ratio of the walls", "contacts", Poisson, POISSON),
         Quantity(
             "contacts.simulated_modulus",

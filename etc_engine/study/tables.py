@@ -137,10 +137,10 @@ class ContactsTable(QuantityTable):
 
     @model_validator(mode="after")
     def _check(self) -> ContactsTable:
-        needs = {key: f"rule = {self.rule!r}" for key in RULES[self.rule].needs}
+        needs = dict.fromkeys(RULES[self.rule].needs, f"rule = {self.rule!r}")
         for choice in ("simulated_modulus", "roughness"):
             if getattr(self, choice) is not None:
-                needs |= {key: choice for key in ("youngs_modulus", "poisson_ratio")}
+                needs |= dict.fromkeys(("youngs_modulus", "poisson_ratio"), choice)
         for key, choice in needs.items():
             if getattr(self, key) is None:
                 raise ValueError(f"{choice} needs {key}, {QUANTITIES[key].allowed}")
