@@ -30,6 +30,6 @@ def fetch_command(study: str, server: str, token_file: Path | None, output: Path
     part = PARTS.get(output.suffix)
     if part is None:
         raise InputError(f"a result is written as .nc, its report as .html: found {str(output)!r}")
-    check_place(output)
+    check_place(output, replaces_result=True)
     client.download(connect(server, token_file), study, output, part)
     click.echo(f"{output}: {output.stat().st_size / 1e6:.2g} MB")

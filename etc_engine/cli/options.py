@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from importlib.util import find_spec
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +58,19 @@ def check_picture(path: Path) -> None:
         raise InputError("pictures need matplotlib: install the extra with pip install 'etc-engine[plot]'")
 
 
-def check_place(path: Path, *inputs: Path) -> None:
-    """Refuse an output that cannot be written, or that is one of the inputs, before the work begins.
+RESULT_MARKS = (b"study_digest", b"study_file")
+"""Names of attributes that only the result of a whole study has."""
+
+
+def check_place(path: Path, *inputs: Path, replaces_result: bool = False) -> None:
+    """Refuse an output that cannot be written, or that would destroy an input or a result, before the work begins.
+
+    Parameters
+    ----------
+    path : Path
+    *inputs : Path
+    replaces_result : bool
+        Whether the command has asked the user already (``--overwrite``) before it replaces the result of a study.
 
     Raises
     ------
@@ -67,5 +79,23 @@ def check_place(path: Path, *inputs: Path) -> None:
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):
             raise OutputError(f"the output {path} is the input itself: it would be lost, choose another name")
+    if not replaces_result and _is_result(path):
+        raise OutputError(
+            f"{path} is the result of a sweep or a transient: it would be lost; choose another name, or remove it first"
+        )
     with replacing(path, keep=False):
         pass
+
+
+def _is_result(path: Path) -> bool:
+    """Whether a file is the result of a study. Its bytes are searched: a damaged file may hang the netCDF library."""
+    if not path.is_file():
+        return False
+    try:
+        with path.open("rb") as file:
+            if not file.read(8).startswith((b"\x89HDF", b"CDF")):
+                return False
+            with mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+                return any(content.find(mark) >= 0 for mark in RESULT_MARKS)
+    except (OSError, ValueError):
+        return False

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,9 @@ import click
 
 if TYPE_CHECKING:
     from etc_engine.packing import ParticlePacking
+
+
+STDOUT = Path("-")
 
 
 @click.command("pack")
@@ -36,7 +40,7 @@ if TYPE_CHECKING:
     "--output",
     type=click.Path(path_type=Path),
     required=True,
-    help="File to write: .csv, .dump or .lammpstrj (LAMMPS), .nc (netCDF) or .vtp (VTK).",
+    help="File to write: .csv, .dump or .lammpstrj (LAMMPS), .nc (netCDF) or .vtp (VTK); - is CSV on stdout.",
 )
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the packing and its structure.")
 @click.option(
@@ -67,8 +71,9 @@ def pack_command(
     from etc_engine.packing import PackingSpec, pack
     from etc_engine.packing.neighbors import neighbor_pairs
     from etc_engine.packing.radii import parse_radii
-    from etc_engine.particle_files.csv_files import ParticleTable
+    from etc_engine.particle_files.csv_files import write_csv
     from etc_engine.particle_files.formats import write_particles
+    from etc_engine.particle_files.table import ParticleTable
 
     if seed is not None and seed < 0:
         raise InputError(f"--seed must not be negative, found {seed}")
@@ -82,28 +87,31 @@ def pack_command(
         density=density,
         growth_rate=growth_rate,
     )
-    _check_format(output)
+    _check_output(output, as_json)
     if plot is not None:
         check_picture(plot)
         check_place(plot)
     seed = int(SeedSequence().generate_state(1)[0]) if seed is None else seed
-    with replacing(output) as file:
-        start = time.perf_counter()
-        with PackingProgress() as progress:
-            packing = pack(spec, default_rng(seed), progress.report)
-        seconds = time.perf_counter() - start
-        contacts = neighbor_pairs(packing, relative_gap=contact_gap).count
-        options = {
-            "method": method,
-            "growth-rate": growth_rate,
-            "radii": radii,
-            "box": box,
-            "count": count,
-            "density": density,
-            "periodic": periodic or None,
-            "seed": seed,
-        }
-        write_particles(file, ParticleTable(packing), _provenance(options, output))
+    start = time.perf_counter()
+    with PackingProgress() as progress:
+        packing = pack(spec, default_rng(seed), progress.report)
+    seconds = time.perf_counter() - start
+    contacts = neighbor_pairs(packing, relative_gap=contact_gap).count
+    options = {
+        "method": method,
+        "growth-rate": growth_rate,
+        "radii": radii,
+        "box": box,
+        "count": count,
+        "density": density,
+        "periodic": periodic or None,
+        "seed": seed,
+    }
+    if output == STDOUT:
+        write_csv(sys.stdout, ParticleTable(packing))
+    else:
+        with replacing(output) as file:
+            write_particles(file, ParticleTable(packing), _provenance(options, output))
     if plot is not None:
         from etc_engine.output.figures import save_structure
 
@@ -123,7 +131,8 @@ def pack_command(
         print_json(record)
     else:
         for name, value in record.items():
-            click.echo(f"{name:14s}{f'{value:.8g}' if isinstance(value, float) else value}")
+            text = f"{name:14s}{f'{value:.8g}' if isinstance(value, float) else value}"
+            click.echo(text, err=output == STDOUT)
 
 
 def _warn_of_growth(packing: ParticlePacking, density: float) -> None:
@@ -142,13 +151,20 @@ def _warn_of_growth(packing: ParticlePacking, density: float) -> None:
         )
 
 
-def _check_format(output: Path) -> None:
+def _check_output(output: Path, as_json: bool) -> None:
     """Refuse a file that could not be written, before the work begins."""
+    from etc_engine.cli.options import check_place
+    from etc_engine.errors import InputError
     from etc_engine.particle_files.formats import VTP, format_to_write
     from etc_engine.particle_files.vtp import require_vtk
 
+    if output == STDOUT:
+        if as_json:
+            raise InputError("-o - writes the packing to stdout, where --json prints its object: give one of them")
+        return
     if format_to_write(output) is VTP:
         require_vtk()
+    check_place(output)
 
 
 def _provenance(options: dict[str, Any], output: Path) -> dict[str, Any]:

@@ -35,7 +35,7 @@ def submit_command(
     if output is not None:
         if output.suffix != ".nc":
             raise InputError(f"a result is written as .nc: found {str(output)!r}")
-        check_place(output, study)
+        check_place(output, study, replaces_result=True)
     place = connect(server, token_file)
     found = client.submit(place, text)
     if waiting or output is not None:

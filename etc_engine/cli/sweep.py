@@ -39,7 +39,7 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
     if dry_run:
         from etc_engine.cli.options import check_place  # loads numpy
 
-        check_place(output)
+        check_place(output, replaces_result=True)
     policy: Policy = "resume" if resume else "overwrite" if overwrite else "fresh"
     return launch(study, output, policy, dry_run=dry_run)
 

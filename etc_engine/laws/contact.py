@@ -1,4 +1,4 @@
-"""Size and resistance of a contact from load: Hertz, contact force, contact area, mean-field load, roughness.
+"""Size of a contact from load: Hertz, contact force, contact area, mean-field load.
 
 Spheres touch in a disk of radius c, disks (cylinders of unit length) in a strip of half-width c. Functions are of
 arrays, one value per contact; a wall has an infinite radius.
@@ -66,6 +66,18 @@ def effective_modulus(side_1: Elastic, side_2: Elastic) -> float:
     return 1.0 / compliance
 
 
+def pair_modulus(youngs: ArrayLike, poisson: ArrayLike, other_youngs: ArrayLike, other_poisson: ArrayLike) -> Floats:
+    """Effective modulus E* of many pairs [Pa]; as `effective_modulus`.
+
+    Examples
+    --------
+    >>> pair_modulus([2.0, 2.0], 0.0, [2.0, np.inf], 0.0)
+    array([1., 2.])
+    """
+    e1, n1, e2, n2 = (np.asarray(v, dtype=np.float64) for v in (youngs, poisson, other_youngs, other_poisson))
+    return 1.0 / ((1.0 - n1**2) / e1 + (1.0 - n2**2) / e2)
+
+
 def hertz_radius(overlap: ArrayLike, radius: ArrayLike) -> Floats:
     r"""Contact radius (3D) or half-width (2D) from the overlap, :math:`c = \sqrt{R^* \delta}` [m].
 
@@ -100,7 +112,7 @@ def hertz_radius(overlap: ArrayLike, radius: ArrayLike) -> Floats:
     return np.sqrt(np.asarray(radius, dtype=np.float64) * np.maximum(delta, 0.0))
 
 
-def radius_from_force(force: ArrayLike, radius: ArrayLike, modulus: float) -> Floats:
+def radius_from_force(force: ArrayLike, radius: ArrayLike, modulus: ArrayLike) -> Floats:
     r"""Radius of the contact disk of two spheres from their normal force, :math:`c = (3 F R^*/(4 E^*))^{1/3}` [m].
 
     Parameters
@@ -128,10 +140,10 @@ def radius_from_force(force: ArrayLike, radius: ArrayLike, modulus: float) -> Fl
     1.01
     """
     load = np.maximum(np.asarray(force, dtype=np.float64), 0.0)
-    return np.cbrt(0.75 * load * np.asarray(radius, dtype=np.float64) / modulus)
+    return np.cbrt(0.75 * load * np.asarray(radius, dtype=np.float64) / np.asarray(modulus, dtype=np.float64))
 
 
-def half_width_from_force(force: ArrayLike, radius: ArrayLike, modulus: float) -> Floats:
+def half_width_from_force(force: ArrayLike, radius: ArrayLike, modulus: ArrayLike) -> Floats:
     r"""Half-width of the contact strip of two parallel cylinders, :math:`c = \sqrt{4 F R^*/(\pi E^*)}` [m].
 
     Parameters
@@ -153,7 +165,7 @@ def half_width_from_force(force: ArrayLike, radius: ArrayLike, modulus: float) -
     1.0
     """
     load = np.maximum(np.asarray(force, dtype=np.float64), 0.0)
-    return np.sqrt(4.0 / np.pi * load * np.asarray(radius, dtype=np.float64) / modulus)
+    return np.sqrt(4.0 / np.pi * load * np.asarray(radius, dtype=np.float64) / np.asarray(modulus, dtype=np.float64))
 
 
 def hertz_force(overlap: ArrayLike, radius: ArrayLike, modulus: float) -> Floats:
@@ -273,150 +285,49 @@ def _check_load(pressure: float, radius: float, density: float, coordination: fl
         )
 
 
-@dataclass(frozen=True)
-class Roughness:
-    """Roughness of a pair of surfaces.
+def reach_from_overlap(overlap: ArrayLike, radius: ArrayLike, dimension: int, softening: ArrayLike = 1.0) -> Floats:
+    r"""Half-width of a contact from the overlap of a run with a softened modulus [m].
+
+    .. math:: c = \sqrt{R^* \delta} \, s^{1/3} \text{ (spheres)}, \qquad c = \sqrt{R^* \delta \, s} \text{ (disks)},
+              \qquad s = E^*_{DEM}/E^*
+
+    The force of the run is kept; the width is that of the true material under it.
 
     Parameters
     ----------
-    height : float [m]
-        Root-mean-square height of both surfaces, sqrt(s_1^2 + s_2^2).
-    slope : float [-]
-        Root-mean-square slope of both surfaces, sqrt(m_1^2 + m_2^2).
-    hardness : float, optional [Pa]
-        Microhardness of the softer one, for plastic asperities.
-    modulus : float, optional [Pa]
-        Effective modulus E*, for elastic asperities. Give hardness or modulus, not both.
-    """
-
-    height: float
-    slope: float
-    hardness: float | None = None
-    modulus: float | None = None
-
-    def __post_init__(self) -> None:
-        if not (self.height >= 0.0 and self.slope > 0.0):
-            raise InputError(
-                f"roughness needs a height >= 0 and a slope > 0, found height {self.height:g} m, slope {self.slope:g}"
-            )
-        given = [value for value in (self.hardness, self.modulus) if value is not None]
-        if len(given) != 1 or not given[0] > 0.0:
-            raise InputError("roughness needs either hardness (plastic) or modulus (elastic), positive [Pa]")
-
-
-def solid_spot_conductance(pressure: ArrayLike, conductivity: ArrayLike, roughness: Roughness) -> Floats:
-    r"""Conductance per area of the microcontacts of two rough surfaces [W/(m2 K)].
-
-    .. math:: h_c = 1.25 k_h \frac{m}{s} \left(\frac{P}{H}\right)^{0.95} \text{(plastic)}, \qquad
-              h_c = 1.55 k_h \frac{m}{s} \left(\frac{\sqrt2 P}{m E^*}\right)^{0.94} \text{(elastic)}
-
-    Parameters
-    ----------
-    pressure : array_like [Pa]
-        Mean pressure P in the contact.
-    conductivity : array_like [W/(m K)]
-        Harmonic mean k_h = 2 k_1 k_2/(k_1 + k_2) of both solids.
-    roughness : Roughness
-
-    Returns
-    -------
-    ndarray [W/(m2 K)]
-        Infinite for smooth surfaces.
-
-    References
-    ----------
-    M. G. Cooper, B. B. Mikic and M. M. Yovanovich, Int. J. Heat Mass Transfer 12, 279 (1969); M. M. Yovanovich (1982)
-    for the constants of the plastic form. B. B. Mikic, Int. J. Heat Mass Transfer 17, 205 (1974), the elastic form.
+    overlap, radius : array_like [m]
+        As in `hertz_radius`.
+    dimension : int
+        2 or 3.
+    softening : array_like, optional [-]
+        Modulus of the run over that of the material; 1 where the run had the true stiffness.
 
     Examples
     --------
-    >>> round(float(solid_spot_conductance(1e6, 10.0, Roughness(1e-6, 0.1, hardness=1e6))))
-    1250000
+    >>> reach_from_overlap(1.0, 1.0, 3, 1e-3).round(12), reach_from_overlap(1.0, 1.0, 2, 1e-2).round(12)
+    (np.float64(0.1), np.float64(0.1))
     """
-    if roughness.height == 0.0:
-        return np.full(np.broadcast_shapes(np.shape(pressure), np.shape(conductivity)), np.inf)
-    p, k = np.asarray(pressure, dtype=np.float64), np.asarray(conductivity, dtype=np.float64)
-    ratio = roughness.slope / roughness.height
-    if roughness.hardness is not None:
-        return 1.25 * k * ratio * (p / roughness.hardness) ** 0.95
-    assert roughness.modulus is not None
-    return 1.55 * k * ratio * (np.sqrt(2.0) * p / (roughness.slope * roughness.modulus)) ** 0.94
+    return hertz_radius(overlap, radius) * np.asarray(softening, dtype=np.float64) ** (
+        1.0 / 3.0 if dimension == 3 else 0.5
+    )
 
 
-def micro_gap_conductance(pressure: ArrayLike, gas_conductivity: float, jump: float, roughness: Roughness) -> Floats:
-    r"""Conductance per area of the gas between the microcontacts of two rough surfaces [W/(m2 K)].
+def reach_from_force(force: ArrayLike, radius: ArrayLike, modulus: ArrayLike, dimension: int) -> Floats:
+    """Half-width of a contact from its force [m]: `radius_from_force` or `half_width_from_force`."""
+    law = radius_from_force if dimension == 3 else half_width_from_force
+    return law(force, radius, modulus)
 
-    .. math:: h_g = \frac{k_g}{Y + M}, \qquad Y = 1.53\, s \left(\frac{P}{H}\right)^{-0.097}, \qquad M = j_1 + j_2
 
-    Parameters
-    ----------
-    pressure : array_like [Pa]
-        Mean pressure P in the contact.
-    gas_conductivity : float [W/(m K)]
-    jump : float [m]
-        Sum M of both jump lengths; infinite in vacuum.
-    roughness : Roughness
-        With a hardness: the plane separation Y is that of plastic asperities. With a modulus, P/H is replaced by
-        sqrt2 P/(m E*), the relative pressure of the elastic conductance: an assumption of this code.
+def mean_pressure(reach: ArrayLike, radius: ArrayLike, modulus: ArrayLike, dimension: int) -> Floats:
+    r"""Mean pressure in a Hertzian contact of half-width c [Pa].
 
-    References
-    ----------
-    M. M. Yovanovich (1982).
+    .. math:: P = \frac{F}{\pi c^2} = \frac{4 E^* c}{3 \pi R^*} \text{ (spheres)}, \qquad
+              P = \frac{F}{2 c} = \frac{\pi E^* c}{8 R^*} \text{ (disks)}
 
     Examples
     --------
-    >>> float(micro_gap_conductance(1e6, 0.153, 0.0, Roughness(1e-6, 0.1, hardness=1e6)))
-    100000.0
+    >>> round(float(mean_pressure(radius_from_force(1.0, 1.0, 1e6), 1.0, 1e6, 3)), 3)
+    3856.05
     """
-    p = np.asarray(pressure, dtype=np.float64)
-    if roughness.hardness is not None:
-        relative = p / roughness.hardness
-    else:
-        assert roughness.modulus is not None
-        relative = np.sqrt(2.0) * p / (roughness.slope * roughness.modulus)
-    with np.errstate(divide="ignore"):
-        gap = 1.53 * roughness.height * relative**-0.097
-        return gas_conductivity / (gap + jump)
-
-
-def area_resistance(
-    pressure: ArrayLike,
-    conductivity: ArrayLike,
-    roughness: Roughness,
-    gas_conductivity: float = 0.0,
-    jump: float = 0.0,
-) -> Floats:
-    r"""Resistance of a rough contact times its area, :math:`1/(h_c + h_g)` [m2 K/W].
-
-    Parameters
-    ----------
-    pressure : array_like [Pa]
-        Mean pressure F/(pi c^2) in the contact disk (F/(2 c) in a strip).
-    conductivity : array_like [W/(m K)]
-        Harmonic mean of both solids.
-    roughness : Roughness
-    gas_conductivity : float, optional [W/(m K)]
-        0 is vacuum.
-    jump : float, optional [m]
-        Sum of both jump lengths.
-
-    Returns
-    -------
-    ndarray [m2 K/W]
-        0 for smooth surfaces.
-
-    Examples
-    --------
-    >>> float(area_resistance(1e6, 10.0, Roughness(0.0, 0.1, hardness=1e9)))
-    0.0
-    >>> round(1e7 * float(area_resistance(1e6, 10.0, Roughness(1e-6, 0.1, hardness=1e6))), 9)
-    8.0
-    """
-    shape = np.broadcast_shapes(np.shape(pressure), np.shape(conductivity))
-    if roughness.height == 0.0:
-        return np.zeros(shape)
-    solid = solid_spot_conductance(pressure, conductivity, roughness)
-    if gas_conductivity > 0.0:
-        solid = solid + micro_gap_conductance(pressure, gas_conductivity, jump, roughness)
-    with np.errstate(divide="ignore"):
-        return 1.0 / solid
+    c, r, e = (np.asarray(v, dtype=np.float64) for v in (reach, radius, modulus))
+    return (4.0 / (3.0 * np.pi) if dimension == 3 else np.pi / 8.0) * e * c / r

@@ -28,10 +28,11 @@ from etc_engine.errors import InputError
 _ZETA_3 = 1.2020569031595942
 _TERMS = 22
 
-# C(x) = zeta(3) + x^2/2 ln x - 3 x^2/4 + x^4 sum_k c_k x^{2k}, from ln(sin z / z) = -sum zeta(2k) (z/pi)^{2k} / k
-_REMAINDER = np.array(
+CLAUSEN_SERIES = np.array(
     [-zeta(2 * k) / (k * (2 * k + 1) * (2 * k + 2)) / (2.0 * np.pi) ** (2 * k) for k in range(1, _TERMS + 1)]
 )
+"""The c_k of C(x) = zeta(3) + x^2/2 ln x - 3 x^2/4 + x^4 sum_k c_k x^{2k}, from the series of ln(sin z / z)."""
+
 # mean of ln cos(t/2) over |t| <= alpha, as a series in alpha^2, from ln cos z = ln(sin 2z / 2z) - ln(sin z / z)
 _LN_COS = np.array([-zeta(2 * k) * (4.0**k - 1.0) / (k * (2 * k + 1)) / (2.0 * np.pi) ** (2 * k) for k in range(1, 61)])
 
@@ -40,13 +41,24 @@ _ENHANCED_DEGREES = np.array([1.0, 2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0])
 _ENHANCED_FACTORS = np.array([0.9799, 0.9762, 0.9729, 0.9707, 0.9693, 0.9682, 0.9675, 0.9672, 0.9671])
 
 
+def position_angles(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Position angle of each arm of a disk, shape (s,) [rad], for arms of shape (s, 2).
+
+    Examples
+    --------
+    >>> position_angles(np.array([[0.0, 2.0], [-1.0, 0.0]])) / np.pi
+    array([0.5, 1. ])
+    """
+    return np.asarray(np.arctan2(arms[:, 1], arms[:, 0]))
+
+
 @njit(cache=True)
 def _remainder(x: float) -> float:
     """C(x) less its singular part zeta(3) + x^2/2 ln x - 3x^2/4, for 0 <= x <= pi."""
     square = x * x
     value = 0.0
     for k in range(_TERMS - 1, -1, -1):
-        value = value * square + _REMAINDER[k]
+        value = value * square + CLAUSEN_SERIES[k]
     return value * square * square
 
 
@@ -190,7 +202,7 @@ def standard_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
 
 
 def _smooth_remainder(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    return x**4 * np.polynomial.polynomial.polyval(x * x, _REMAINDER)
+    return x**4 * np.polynomial.polynomial.polyval(x * x, CLAUSEN_SERIES)
 
 
 def enhanced_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
@@ -280,3 +292,71 @@ def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
     if method not in SELF_RESISTANCE:
         raise InputError(f"unknown method {method!r}: expected one of {', '.join(SELF_RESISTANCE)}")
     return SELF_RESISTANCE[method](alpha)
+
+
+def resistance_matrices(
+    offsets: NDArray[np.int64],
+    arms: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    method: str,
+    cutting: NDArray[np.bool_] | None = None,  # noqa: ARG001  (the interface of both laws)
+) -> NDArray[np.float64]:
+    """Resistance matrices kappa H of many disks, packed row by row one after the other.
+
+    Parameters
+    ----------
+    offsets : ndarray of int, shape (n + 1,)
+        Contacts of disk p: ``offsets[p]`` to ``offsets[p + 1]``.
+    arms : ndarray, shape (s, 2)
+        Directions of the contacts from the centre, of any length.
+    alpha : ndarray, shape (s,) [rad]
+    method : str
+        ``chord``, ``standard`` or ``enhanced``.
+    cutting : ndarray of bool, shape (s,), optional
+        Without effect: mutual resistances of disks do not know the segments cut off.
+
+    Returns
+    -------
+    ndarray, shape (sum of squared contact numbers,)
+        Dimensionless.
+
+    Examples
+    --------
+    >>> h = resistance_matrices(np.array([0, 2]), np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([0.1, 0.1]), "chord")
+    >>> h.reshape(2, 2).round(4).tolist()
+    [[1.1639, 0.0003], [0.0003, 1.1639]]
+    """
+    theta = np.arctan2(arms[:, 1], arms[:, 0])
+    starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
+    return _matrices(offsets, starts, theta, np.ascontiguousarray(alpha), self_resistance(alpha, method))
+
+
+@njit(cache=True)
+def _matrices(
+    offsets: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    theta: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    own: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    values = np.empty(starts[-1])
+    for p in range(offsets.size - 1):
+        o, s, n = offsets[p], starts[p], offsets[p + 1] - offsets[p]
+        for i in range(n):
+            values[s + i * n + i] = own[o + i]
+            for j in range(i):
+                h = mutual_resistance_scalar(theta[o + i] - theta[o + j], alpha[o + i], alpha[o + j])
+                values[s + i * n + j] = h
+                values[s + j * n + i] = h
+    return values
+
+
+def first_moments(arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean unit direction over each arc, n sin(alpha)/alpha, shape (s, 2)."""
+    theta = np.arctan2(arms[:, 1], arms[:, 0])
+    return np.sinc(alpha / np.pi)[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+
+
+def segment_area(alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Area behind a chord of half-angle alpha, alpha - sin alpha cos alpha, of the unit disk."""
+    return np.asarray(alpha - np.sin(alpha) * np.cos(alpha))

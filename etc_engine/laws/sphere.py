@@ -224,8 +224,23 @@ def mutual_resistance(
     return _mutual(cosine.ravel(), a, b, method == "standard").reshape(cosine.shape)
 
 
+def first_moments(arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+    """First harmonic of an equilibrium disk, n (1 + 2 cos alpha)/3, shape (s, 3); of a cap nearly the same."""
+    unit = arms / np.linalg.norm(arms, axis=1, keepdims=True)
+    return np.asarray(unit * ((1.0 + 2.0 * np.cos(alpha)) / 3.0)[:, None])
+
+
+def cap_volume(alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Volume behind a contact disk of half-angle alpha, pi (1 - cos alpha)^2 (2 + cos alpha)/3, of the unit sphere."""
+    return np.asarray(np.pi / 3.0 * (2.0 * np.sin(0.5 * alpha) ** 2) ** 2 * (2.0 + np.cos(alpha)))
+
+
 def resistance_matrices(
-    offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha: NDArray[np.float64], method: str
+    offsets: NDArray[np.int64],
+    arms: NDArray[np.float64],
+    alpha: NDArray[np.float64],
+    method: str,
+    cutting: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
     """Resistance matrices kappa R H of many spheres, packed row by row one after the other.
 
@@ -237,12 +252,14 @@ def resistance_matrices(
     ----------
     offsets : ndarray of int, shape (n + 1,)
         Contacts of sphere p: ``offsets[p]`` to ``offsets[p + 1]``.
-    normals : ndarray, shape (s, 3)
-        Unit directions of the contacts from the centre.
+    arms : ndarray, shape (s, 3)
+        Directions of the contacts from the centre, of any length.
     alpha : ndarray, shape (s,) [rad]
         Half-angles; two contacts of a sphere must not meet.
     method : str
         ``chord`` or ``standard``.
+    cutting : ndarray of bool, shape (s,), optional
+        Contacts that dent the sphere; all by default.
 
     Returns
     -------
@@ -258,11 +275,14 @@ def resistance_matrices(
     --------
     >>> h = resistance_matrices(np.array([0, 2]), np.array([[0, 0, 1.0], [0, 0, -1.0]]), np.array([0.1, 0.1]), "chord")
     >>> h.reshape(2, 2).round(4).tolist()
-    [[2.4975, -0.1347], [-0.1347, 2.4975]]
+    [[2.5461, -0.1344], [-0.1344, 2.5461]]
     """
     own = self_resistance(alpha, method)
     starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
-    return _matrices(offsets, starts, np.ascontiguousarray(normals), alpha, own, method == "standard")
+    normals = np.ascontiguousarray(arms / np.linalg.norm(arms, axis=1, keepdims=True))
+    volumes = np.where(method == "standard", 0.0, cap_volume(alpha))
+    volumes = volumes if cutting is None else np.where(cutting, volumes, 0.0)
+    return _matrices(offsets, starts, normals, np.ascontiguousarray(alpha), own, volumes, method == "standard")
 
 
 @njit(cache=True)
@@ -349,6 +369,7 @@ def _matrices(
     normals: NDArray[np.float64],
     alpha: NDArray[np.float64],
     own: NDArray[np.float64],
+    volumes: NDArray[np.float64],
     uniform: bool,
 ) -> NDArray[np.float64]:
     """H_kl, and its dents sum_j V_j g_jk . g_jl for disks, of all spheres."""
@@ -369,22 +390,21 @@ def _matrices(
                 h = mutual_of_caps(cosine, a, b) if uniform else mutual_of_disks(cosine, a, b)
                 values[s + i * n + j] = h
                 values[s + j * n + i] = h
-        if not uniform:
-            for j in range(n):
-                _add_dent(values[s : s + n * n], normals[o : o + n], j, alpha[o + j], gradient)
+        for j in range(n):
+            if volumes[o + j] > 0.0:
+                _add_dent(values[s : s + n * n], normals[o : o + n], j, volumes[o + j], gradient)
     return values
 
 
 @njit(cache=True, error_model="numpy")
 def _add_dent(
-    h: NDArray[np.float64], normals: NDArray[np.float64], j: int, a: float, gradient: NDArray[np.float64]
+    h: NDArray[np.float64], normals: NDArray[np.float64], j: int, volume: float, gradient: NDArray[np.float64]
 ) -> None:
     """H_kl += V_j g_jk . g_jl with g_jk = N'(cos gamma_jk) (n_k - cos gamma_jk n_j), g_jj = 0.
 
     4 pi N' = [1/s^3 + (1 + 2s)/(s^2 (1 + s))]/4, s = sin(gamma/2).
     """
     n = len(normals)
-    volume = math.pi / 3.0 * (2.0 * math.sin(0.5 * a) ** 2) ** 2 * (2.0 + math.cos(a))
     for k in range(n):
         cosine = 0.0
         for axis in range(3):

@@ -69,7 +69,7 @@ def sphere_temperatures(
     ...     np.zeros(3, dtype=np.int64), at, np.array([0, 2]), ends, np.full(2, 0.1), np.array([1.0, -1.0]), "chord"
     ... )
     >>> (values.round(4) + 0.0).tolist()
-    [0.196, 0.0, -0.196]
+    [0.297, 0.0, -0.297]
     """
     return _temperatures(
         np.ascontiguousarray(spheres, dtype=np.int64),

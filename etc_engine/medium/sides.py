@@ -9,29 +9,33 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.errors import GeometryError
+from etc_engine.laws.by_dimension import law_of
 from etc_engine.medium.network import ContactNetwork
 
 
 @dataclass(frozen=True, eq=False)
 class InsulatedCuts:
-    """Chords at which insulated walls cut disks.
+    """Contacts at which insulated walls cut particles.
 
     Parameters
     ----------
     particles : ndarray of int, shape (c,)
     walls : ndarray of int, shape (c,)
         Row of the cut among the wall contacts of the network.
-    theta, alpha : ndarray, shape (c,) [rad]
-        Position angle and half-angle of each cut.
+    arms : ndarray, shape (c, d)
+        Unit direction of each cut.
+    alpha : ndarray, shape (c,) [rad]
+        Its half-angle.
     """
 
     particles: NDArray[np.int64]
     walls: NDArray[np.int64]
-    theta: NDArray[np.float64]
+    arms: NDArray[np.float64]
     alpha: NDArray[np.float64]
 
 
-NO_CUTS = InsulatedCuts(*np.zeros((2, 0), dtype=np.int64), *np.zeros((2, 0)))
+NONE = np.zeros(0, dtype=np.int64)
+NO_CUTS = InsulatedCuts(NONE, NONE, np.zeros((0, 2)), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +51,13 @@ class ContactSides:
     arms : ndarray, shape (s, d) [m]
         Vector from the particle's centre towards the contact; at the two sides of a particle contact they
         differ by the branch vector.
-    theta : ndarray, shape (s,) [rad]
-        Position angle of the contact.
     alpha : ndarray, shape (s,) [rad]
-        Half-angle of the contact's arc.
+        Half-angle of the contact.
+    resistances : ndarray, shape (s,) [K/W, in 2D m K/W]
+        Part of the contact's resistance that belongs to the side: half of it on either side of a particle contact,
+        all of it on the one side of a wall contact.
+    radii : ndarray, shape (n,) [m]
+        Of the particles.
     of_contacts : ndarray of int, shape (m, 2)
         The two sides of each particle contact.
     of_walls : ndarray of int, shape (w,)
@@ -62,11 +69,17 @@ class ContactSides:
     offsets: NDArray[np.int64]
     nodes: NDArray[np.int64]
     arms: NDArray[np.float64]
-    theta: NDArray[np.float64]
     alpha: NDArray[np.float64]
+    resistances: NDArray[np.float64]
+    radii: NDArray[np.float64]
     of_contacts: NDArray[np.int64]
     of_walls: NDArray[np.int64]
     cuts: InsulatedCuts = NO_CUTS
+
+    @property
+    def dimension(self) -> int:
+        """2 for disks, 3 for spheres."""
+        return int(self.arms.shape[1])
 
     @property
     def particles(self) -> NDArray[np.int64]:
@@ -87,14 +100,20 @@ def insulated_cuts(network: ContactNetwork, driven: NDArray[np.bool_]) -> Insula
     Parameters
     ----------
     network : ContactNetwork
-        Two-dimensional.
     driven : ndarray of bool, shape (w,)
     """
     if not network.geometric:
         return NO_CUTS
     rows = np.flatnonzero(~driven)
-    towards = np.array([np.pi, 0.0, -0.5 * np.pi, 0.5 * np.pi])
-    return InsulatedCuts(network.wall_particles[rows], rows, towards[network.walls[rows]], network.wall_angles[rows])
+    arms = wall_normals(network.walls[rows], network.packing.dimension)
+    return InsulatedCuts(network.wall_particles[rows], rows, arms, network.wall_angles[rows])
+
+
+def wall_normals(walls: NDArray[np.int64], dimension: int) -> NDArray[np.float64]:
+    """Outward unit normals of walls, shape (w, d)."""
+    normals = np.zeros((walls.size, dimension))
+    normals[np.arange(walls.size), walls // 2] = 2.0 * (walls % 2) - 1.0
+    return normals
 
 
 def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> ContactSides:
@@ -102,8 +121,7 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
     packing, m = network.packing, network.count
     radii = packing.radii[network.pairs]
     share = radii[:, :1] / radii.sum(axis=1, keepdims=True)
-    normals = np.zeros((network.walls.size, packing.dimension))
-    normals[np.arange(network.walls.size), network.walls // 2] = 2.0 * (network.walls % 2) - 1.0
+    normals = wall_normals(network.walls, packing.dimension)
     owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
     nodes = np.concatenate([np.arange(m), np.arange(m), m + np.arange(network.walls.size)])
     arms = np.concatenate(
@@ -114,17 +132,19 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
         ]
     )
     alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
+    half = 0.5 * network.resistances
+    resistances = np.concatenate([half, half, network.wall_resistances])
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=packing.count))])
     place = np.empty_like(order)
     place[order] = np.arange(order.size)
-    arms = arms[order]
     return ContactSides(
         offsets=offsets,
         nodes=nodes[order],
-        arms=arms,
-        theta=np.arctan2(arms[:, 1], arms[:, 0]),
+        arms=arms[order],
         alpha=alpha[order],
+        resistances=resistances[order],
+        radii=packing.radii,
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],
         cuts=cuts,
@@ -132,58 +152,63 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
 
 
 def check_arcs(sides: ContactSides) -> None:
-    """Refuse contact arcs that overlap on one particle.
+    """Refuse contacts that overlap on one particle.
 
     Raises
     ------
     GeometryError
-        Naming the first particle, the distance of the two arcs and their half-angles.
+        Naming the first particle, the distance of the two contacts and their half-angles.
     """
-    refuse_overlap(sides.offsets, sides.theta, sides.alpha)
+    refuse_overlap(sides.offsets, sides.arms, sides.alpha)
 
 
-def refuse_overlap(offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
-    """Raise the error of `check_arcs` for the arcs ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
-    particle, a, b = _overlapping_arcs(offsets, theta, alpha)
-    if particle >= 0:
-        alpha, theta = np.degrees(alpha[[a, b]]), np.degrees(theta[[a, b]])
-        apart = abs((theta[0] - theta[1] + 180.0) % 360.0 - 180.0)
+def refuse_overlap(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
+    """Raise the error of `check_arcs` for the contacts ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
+    normals = unit_vectors(arms)
+    number, a, b = _close_pairs(offsets, normals, alpha, 1.0)
+    if number:
+        particle = int(np.searchsorted(offsets, a, side="right")) - 1
+        apart = 2.0 * np.degrees(np.arcsin(min(0.5 * float(np.linalg.norm(normals[a] - normals[b])), 1.0)))
         raise GeometryError(
-            f"two contact arcs of particle {particle} overlap: {apart:.4g} degrees apart with half-angles "
-            f"{alpha[0]:.4g} and {alpha[1]:.4g}; use smaller contact angles or less overlap"
+            f"two contact {law_of(arms.shape[1]).contact}s of particle {particle} overlap: {apart:.4g} degrees apart "
+            f"with half-angles {np.degrees(alpha[a]):.4g} and {np.degrees(alpha[b]):.4g}; use smaller contact angles "
+            f"or less overlap"
         )
 
 
-@njit(cache=True)
-def _overlapping_arcs(
-    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]
-) -> tuple[int, int, int]:
-    """First particle with overlapping arcs and the two sides, or -1."""
-    for p in range(offsets.size - 1):
-        for a in range(offsets[p], offsets[p + 1]):
-            for b in range(offsets[p], a):
-                separation = abs(theta[a] - theta[b])
-                if min(separation, 2.0 * np.pi - separation) < alpha[a] + alpha[b]:
-                    return p, a, b
-    return -1, -1, -1
+def unit_vectors(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions of arms, shape (s, d)."""
+    lengths = np.sqrt((arms**2).sum(axis=1))
+    return np.ascontiguousarray(arms / np.where(lengths > 0.0, lengths, 1.0)[:, None])
 
 
 def count_close_arcs(sides: ContactSides) -> int:
-    """Pairs of arcs on one particle whose gap is less than the sum of their half-angles.
+    """Pairs of contacts on one particle whose gap is less than the sum of their half-angles.
 
     There the flux through one contact feels the other, and ``chord``, which takes every source for a far one,
     loses its accuracy.
     """
-    return int(_close_arcs(sides.offsets, sides.theta, sides.alpha))
+    return int(_close_pairs(sides.offsets, unit_vectors(sides.arms), sides.alpha, 2.0)[0])
 
 
 @njit(cache=True)
-def _close_arcs(offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]) -> int:
-    number = 0
+def _close_pairs(
+    offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha: NDArray[np.float64], factor: float
+) -> tuple[int, int, int]:
+    """Number of pairs on one particle closer than ``factor`` times the sum of their half-angles, and the first of them.
+
+    The chord |n_a - n_b| = 2 sin(separation/2) keeps its digits for near directions, in 2D and 3D.
+    """
+    number, first, second = 0, -1, -1
     for p in range(offsets.size - 1):
         for a in range(offsets[p], offsets[p + 1]):
             for b in range(offsets[p], a):
-                separation = abs(theta[a] - theta[b])
-                if min(separation, 2.0 * np.pi - separation) < 2.0 * (alpha[a] + alpha[b]):
+                square = 0.0
+                for k in range(normals.shape[1]):
+                    square += (normals[a, k] - normals[b, k]) ** 2
+                reach = min(factor * (alpha[a] + alpha[b]), np.pi)
+                if np.sqrt(square) < 2.0 * np.sin(0.5 * reach):
+                    if number == 0:
+                        first, second = a, b
                     number += 1
-    return number
+    return number, first, second

@@ -1,49 +1,38 @@
-"""Particle files: CSV in and out."""
+"""Particle files: tables of text with a header, CSV in and out."""
 
 from __future__ import annotations
 
 import csv
-import warnings
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TextIO
 
 from etc_engine.box import AXES, Box
 from etc_engine.errors import InputError
-from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.columns import ColumnReader, batches, find_layout
+from etc_engine.particle_files.digits import PrintedColumn, PrintedColumns
+from etc_engine.particle_files.sample import Rows, Sample, make_table
+from etc_engine.particle_files.streams import BOM, open_stream
+from etc_engine.particle_files.table import ParticleTable
+
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+LONGEST = 1 << 20
+"""No line of a table of particles has more bytes than this."""
 
 
-@dataclass(frozen=True, eq=False)
-class ParticleTable:
-    """What a particle file holds.
-
-    Parameters
-    ----------
-    packing : ParticlePacking
-    conductivity : ndarray, shape (n,) [W/(m K)], or None
-        Conductivity of each particle, where the file gives it.
-    ids : ndarray of int64, shape (n,), or None
-        Number by which the file names each particle, where it does.
-    wrapped : int
-        Centres that lay outside the box along a periodic axis and were wrapped into it; only counted for CSV.
-    """
-
-    packing: ParticlePacking
-    conductivity: NDArray[np.float64] | None = None
-    ids: NDArray[np.int64] | None = None
-    wrapped: int = 0
-
-
-def read_csv(path: Path | str, box: Box) -> ParticleTable:
-    """Particles from a CSV file with the header ``x,y[,z],radius[,conductivity]`` in any order.
+def read_csv(path: Path | str, box: Box | None = None, sample: Sample | None = None) -> ParticleTable:
+    """Particles from a table of text with the header ``x,y[,z],radius[,conductivity]``, in any order and among other
+    columns.
 
     Parameters
     ----------
     path : path
-    box : Box
+        Separated by commas, semicolons, tabs or blanks; plain, gzip or Zstandard.
+    box : Box, optional
         Its dimension decides whether a ``z`` column is wanted.
+    sample : Sample, optional
+        Box, crop, dimension and column of radii in the place of ``box``.
 
     Returns
     -------
@@ -53,78 +42,185 @@ def read_csv(path: Path | str, box: Box) -> ParticleTable:
     ------
     InputError, GeometryError
         If the file is missing, its header or a value is not understood, or a particle is not valid.
+
+    Notes
+    -----
+    Names of columns may be written large or small; ``diameter`` may stand for ``radius``. Lines that are blank or
+    begin with ``#`` are left out, but the header itself may begin with ``#``.
+    """
+    chosen = sample or Sample()
+    if box is not None:
+        chosen = Sample(
+            box=tuple((0.0, length) for length in box.lengths),
+            periodic=box.periodic_axes,
+            crop=chosen.crop,
+            radius_column=chosen.radius_column,
+        )
+    return make_table(csv_rows(path, chosen.radius_column), chosen)
+
+
+def csv_rows(path: Path | str, radius_column: str | None = None) -> Rows:
+    """Rows of a table of text, in the coordinates of the file.
+
+    Raises
+    ------
+    InputError
     """
     path = Path(path)
-    names = _header(path, box.dimension)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # an empty table is refused below, in our words
-            values = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2, encoding="utf-8-sig")
-    except ValueError:
-        values = None
-    if values is None or (values.size and values.shape[1] != len(names)):
-        raise InputError(_first_bad_row(path, names))
-    if values.size == 0:
+    with open_stream(path) as stream:
+        lines = _content(path, stream)
+        number, header = next(lines, (0, ""))
+        if not header:
+            raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
+        names, separator = _header(path, number, header)
+        return table_rows(path, names, separator, lines, radius_column)
+
+
+def table_rows(
+    path: Path, names: Sequence[str], separator: str | None, lines: Iterator[tuple[int, str]], radius_column: str | None
+) -> Rows:
+    """Rows of a table whose columns are known.
+
+    Parameters
+    ----------
+    path : Path
+    names : sequence of str
+    separator : str or None
+        Between words; None is white space.
+    lines : iterator of (int, str)
+        Number and text of each line.
+    radius_column : str, optional
+
+    Raises
+    ------
+    InputError
+    """
+    layout = find_layout(str(path), names, radius_column)
+    if any(layout.scaled):
+        raise InputError(f"{path} has positions scaled by a box that it does not hold; found {','.join(names)}")
+    reader = ColumnReader(str(path), layout, separator)
+    for batch in batches(lines):
+        reader.feed(_unquoted([text for _, text in batch], separator), [number for number, _ in batch])
+    if not reader.rows:
         raise InputError(f"{path} holds no particles, only a header")
-    columns = dict(zip(names, values.T, strict=True))
-    centers = np.stack([columns[axis] for axis in AXES[: box.dimension]], axis=1)
-    packing = ParticlePacking(centers, columns["radius"], box)
-    wrapped = int(((centers < 0.0) | (centers > np.asarray(box.lengths))).any(axis=1).sum())
-    return ParticleTable(packing, columns.get("conductivity"), wrapped=wrapped)
+    radii, digits = reader.column("radius"), reader.digits()
+    assert radii is not None
+    half = 0.5 if layout.halved else 1.0
+    printed = None
+    if digits is not None:
+        positions = tuple(PrintedColumn(digits[axis]) for axis in AXES[: len(layout.positions)])
+        printed = PrintedColumns(positions, PrintedColumn(digits["radius"], half))
+    return Rows(
+        place=str(path),
+        positions=reader.positions(),
+        radii=half * radii,
+        conductivity=reader.column("conductivity"),
+        ids=reader.ids(),
+        types=reader.types(),
+        temperature=reader.column("temperature"),
+        printed=printed,
+    )
 
 
-def write_csv(path: Path | str, table: ParticleTable) -> None:
-    """Write particles as CSV, with as many digits as it takes to read back the same numbers."""
+def write_csv(target: Path | str | TextIO, table: ParticleTable) -> None:
+    """Write particles as CSV to a file or an open stream, with as many digits as read back the same numbers."""
+    if isinstance(target, (str, Path)):
+        with Path(target).open("w", newline="", encoding="utf-8") as file:
+            write_csv(file, table)
+        return
     packing = table.packing
     names = [*AXES[: packing.dimension], "radius"]
     columns = [*packing.centers.T, packing.radii]
     if table.conductivity is not None:
         names.append("conductivity")
         columns.append(table.conductivity)
-    with Path(path).open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def _header(path: Path, dimension: int) -> list[str]:
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            names = [name.strip() for name in next(csv.reader(file), [])]
-    except FileNotFoundError:
-        raise InputError(f"there is no file {path}") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path} cannot be read as a CSV file: {error}") from None
-    wanted = [*AXES[:dimension], "radius"]
-    allowed = [*wanted, "conductivity"]
-    if sorted(set(names)) != sorted(names) or not set(wanted) <= set(names) <= set(allowed):
+def numbered_lines(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:
+    """Lines of a text file with their numbers from 1.
+
+    Raises
+    ------
+    InputError
+        If it is no text in UTF-8.
+    """
+    yield from enumerate(_lines(path, stream), 1)
+
+
+def _content(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers, without blank ones and comments; a header behind ``#`` is no comment."""
+    headed = False
+    for number, raw in numbered_lines(path, stream):
+        text = raw.strip()
+        if not text:
+            continue
+        if text.startswith("#"):
+            if headed or not _names_positions(text.lstrip("# \t")):
+                continue
+            text = text.lstrip("# \t")
+        headed = True
+        yield number, text
+
+
+def _lines(path: Path, stream: Iterable[bytes]) -> Iterator[str]:
+    """Lines of text; old line ends (a carriage return alone) count."""
+    first = True
+    for line in stream:
+        if len(line) > LONGEST:
+            raise InputError(f"{path} is not a table of text: it has a line of {len(line)} bytes")
+        try:
+            text = (line.removeprefix(BOM) if first else line).decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"{path} is not a format I know, and cannot be read as text: {error.reason} in {line[:40]!r}"
+            ) from None
+        if "\x00" in text:
+            raise InputError(f"{path} is not a table of text: it holds zero bytes")
+        first = False
+        yield from text.splitlines() or [""]
+
+
+def _names_positions(text: str) -> bool:
+    words = {word.strip().strip('"').lower() for word in text.replace(";", ",").replace(",", " ").split()}
+    return {"x", "y"} <= words or {"points:0", "points:1"} <= words
+
+
+def _header(path: Path, number: int, header: str) -> tuple[list[str], str | None]:
+    """Names of the columns, and what separates them."""
+    separator = next((mark for mark in SEPARATORS if mark in header), None)
+    names = [name.strip().strip('"') for name in (header.split(separator) if separator else header.split())]
+    if all(_is_number(name) for name in names):
         raise InputError(
-            f"{path} has the header {','.join(names)!r}: a {dimension}D box needs {','.join(wanted)!r}, "
-            f"optionally with 'conductivity'"
+            f"{path}, line {number}: a header such as 'x,y,radius' must come first, found the numbers {header[:60]!r}"
         )
-    return names
+    if not _names_positions(" ".join(names)):
+        raise InputError(
+            f"{path} is not a format I know: its first line {header[:60]!r} is no header such as 'x,y,radius', and no "
+            "other format begins like that"
+        )
+    doubled = {name for name in names if [other.lower() for other in names].count(name.lower()) > 1}
+    if doubled:
+        raise InputError(f"{path} has the header {header[:80]!r}: the column {sorted(doubled)[0]!r} stands there twice")
+    return names, separator
 
 
-def _first_bad_row(path: Path, names: list[str]) -> str:
-    """What is wrong with a table that could not be read, as one line."""
+def _is_number(word: str) -> bool:
     try:
-        return _find_bad_row(path, names) or f"{path} cannot be read as a table of numbers"
-    except (UnicodeDecodeError, csv.Error) as error:
-        return f"{path} cannot be read as a CSV file: {error}"
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
-def _find_bad_row(path: Path, names: list[str]) -> str:
-    """What is wrong with the first bad row; empty if there is none."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = csv.reader(file)
-        next(rows)
-        for row in rows:
-            where = f"{path}, line {rows.line_num}"
-            if row and len(row) != len(names):
-                return f"{where}: expected {len(names)} values ({','.join(names)}), found {len(row)}"
-            for name, word in zip(names, row, strict=False):
-                try:
-                    float(word)
-                except ValueError:
-                    return f"{where}: {name} is not a number: {word!r}"
-    return ""
+def _unquoted(lines: list[str], separator: str | None) -> list[str]:
+    """Lines without quotes; a separator inside quotes becomes a blank."""
+    if separator is None or not any('"' in line for line in lines):
+        return lines
+    try:
+        rows = list(chain.from_iterable(csv.reader([line], delimiter=separator) for line in lines))
+    except csv.Error:
+        return lines  # refused by the number of its columns
+    return [separator.join(word.replace(separator, " ") for word in row) for row in rows]

@@ -2,71 +2,92 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.box import AXES, Box
+from etc_engine.box import AXES
 from etc_engine.errors import InputError
-from etc_engine.packing.particles import ParticlePacking
-from etc_engine.particle_files.csv_files import ParticleTable
+from etc_engine.particle_files.columns import BATCH, ColumnReader, batches, find_layout
+from etc_engine.particle_files.digits import PrintedColumn, PrintedColumns
+from etc_engine.particle_files.items import Frame, find_frames, table_lines
+from etc_engine.particle_files.sample import Rows, Sample, make_table
+from etc_engine.particle_files.streams import open_stream
+from etc_engine.particle_files.table import ParticleTable
 from etc_engine.particle_files.trajectory import Trajectory
 
-FLAT = 1e-9
-"""Centres whose heights differ by less than this part of the largest radius lie in one plane."""
+REMEDY = "write the dump with 'dump_modify ID format float %.17g'"
+UNITS = {
+    "si": 1.0,
+    "cgs": 1e-2,
+    "micro": 1e-6,
+    "nano": 1e-9,
+    "real": 1e-10,
+    "metal": 1e-10,
+    "electron": 5.29177210544e-11,
+    "lj": 1.0,
+}
+"""Metres per unit of length of the unit styles of LAMMPS (manual page ``units``; Bohr radius of CODATA 2022)."""
 
 
-class _Frame(NamedTuple):
-    """One frame as it stands in the file."""
-
-    timestep: int
-    box_header: list[str]
-    box_lines: list[str]
-    columns: list[str]
-    atoms: list[str]
-
-
-def read_dump(path: Path | str, frame: int = -1) -> ParticleTable:
+def read_dump(path: Path | str, frame: int = -1, sample: Sample | None = None) -> ParticleTable:
     """Particles of one frame of a text dump.
 
     Parameters
     ----------
     path : path
+        Plain, gzip or Zstandard.
     frame : int
         Number of the frame from 0; -1 is the last.
+    sample : Sample, optional
+        Box, periodic axes, crop, dimension and column of radii, where they are not the file's.
 
     Returns
     -------
     ParticleTable
         Sorted by ``id`` where the dump has one. The box and its periodic axes are the file's (flag ``p`` is
-        periodic, ``f``, ``s`` and ``m`` are walls), moved to the origin. Centres in one plane make a
-        two-dimensional packing.
+        periodic, ``f``, ``s`` and ``m`` are walls), moved to the origin.
 
     Raises
     ------
     InputError, GeometryError
-        If the file is missing or not such a dump, the box is triclinic, positions or a radius (diameter) are
-        missing, or there is no such frame.
+        If the file is missing or not such a dump, the box is tilted, positions or a radius (diameter) are missing, the
+        particles are no spheres, or there is no such frame.
+
+    Notes
+    -----
+    The box decides on the dimension. A box that is periodic along z and holds z = 0 is that of a two-dimensional run
+    if all heights are 0; every other box with heights holds spheres. Only the wanted frame and columns are kept in
+    memory.
     """
-    path = Path(path)
-    frames = list(_frames(path))
+    chosen = replace(sample or Sample(), frame=frame)
+    return make_table(dump_rows(Path(path), chosen), chosen)
+
+
+def dump_rows(path: Path, sample: Sample) -> Rows:
+    """Rows of one frame of a text dump.
+
+    Raises
+    ------
+    InputError
+    """
+    frame = -1 if sample.frame is None else sample.frame
+    frames = find_frames(path, frame if frame >= 0 else None)
     if not -len(frames) <= frame < len(frames):
         held = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
         raise InputError(f"{path} holds {held}, numbered from 0: there is no frame {frame}")
-    return _particles(path, frames[frame])
+    return frame_rows(path, frames[frame], _scale(path, frames), sample.radius_column)
 
 
 def count_frames(path: Path | str) -> int:
     """Number of frames of a text dump."""
-    return sum(1 for _ in _frames(Path(path)))
+    return len(find_frames(Path(path)))
 
 
-def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
+def read_trajectory(path: Path | str, timestep: float = 1.0, sample: Sample | None = None) -> Trajectory:
     """All frames of a text dump: one set of particles that moves.
 
     Parameters
@@ -74,6 +95,8 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
     path : path
     timestep : float [s]
         Time of one step of the code that wrote the dump; the frames' steps times it are their times.
+    sample : Sample, optional
+        As of `read_dump`; no crop.
 
     Returns
     -------
@@ -93,41 +116,55 @@ def read_trajectory(path: Path | str, timestep: float = 1.0) -> Trajectory:
     path = Path(path)
     if not (np.isfinite(timestep) and timestep > 0.0):
         raise InputError(f"the time step of a dump must be positive, found {timestep:g}")
-    steps, packings = [], []
-    conductivity: NDArray[np.float64] | None = None
-    ids: NDArray[np.int64] | None = None
-    for number, frame in enumerate(_frames(path)):
-        table = _particles(path, frame)
-        if table.ids is None:
-            raise InputError(f"{path}: frame {number} has no column id, by which particles are followed through frames")
-        if ids is not None and not np.array_equal(ids, table.ids):
-            odd = np.setxor1d(ids, table.ids)
-            what = f"particle {odd[0]} is not in both" if odd.size else "ids repeat"
-            raise InputError(f"{path}: frame {number} does not hold the particles of frame 0 ({what}): all must stay")
-        if ids is None:
-            conductivity = table.conductivity
+    chosen = sample or Sample()
+    steps: list[int] = []
+    tables: list[ParticleTable] = []
+    frames = find_frames(path)
+    for frame in frames:
+        rows = frame_rows(path, frame, _scale(path, frames), chosen.radius_column)
+        table = make_table(rows, chosen)
         ids = table.ids
-        steps.append(frame.timestep)
-        packings.append(table.packing)
-    assert ids is not None
+        if ids is None:
+            raise InputError(
+                f"{path}: frame {frame.number} has no column id, by which particles are followed through frames"
+            )
+        if tables:
+            _refuse_others(path, frame.number, ids, tables[0].ids)
+        steps.append(_step(path, frame))
+        tables.append(table)
+    first = tables[0]
     times = timestep * (np.array(steps, dtype=np.float64) - steps[0])
-    return Trajectory(times, tuple(packings), ids, conductivity)
+    return Trajectory(times, tuple(table.packing for table in tables), first.ids, first.conductivity, tuple(tables))
+
+
+def _refuse_others(path: Path, number: int, ids: NDArray[np.int64], first: NDArray[np.int64] | None) -> None:
+    """Refuse a frame that does not hold the particles of the first one."""
+    assert first is not None
+    if np.array_equal(ids, first):
+        return
+    odd = np.setxor1d(ids, first)
+    what = f"particle {odd[0]} is not in both" if odd.size else "ids repeat"
+    if ids.size != first.size:
+        what += f"; {ids.size} particles instead of {first.size}"
+    raise InputError(
+        f"{path}: frame {number} does not hold the particles of frame 0 ({what}): all must stay; "
+        "write the frames of a part of the run, or of a group of particles that stay"
+    )
 
 
 def write_dump(path: Path | str, table: ParticleTable, timestep: int = 0) -> None:
     """Write particles as one frame of a LAMMPS text dump, with as many digits as read back the same numbers.
 
-    Raises
-    ------
-    InputError
-        If spheres lie in one plane: a dump does not tell them from disks.
+    Notes
+    -----
+    Disks are written as LAMMPS does in two dimensions: heights 0 in a slab of unit height about z = 0.
     """
     with Path(path).open("w", encoding="utf-8", newline="\n") as file:
         _write_frame(file, table, timestep)
 
 
 def write_trajectory(path: Path | str, trajectory: Trajectory, timestep: float = 1.0) -> None:
-    """Write a trajectory as frames of a LAMMPS text dump, one a time; `read_trajectory` reads it back.
+    """Write a trajectory as frames of a LAMMPS text dump, one per time; `read_trajectory` reads it back.
 
     Parameters
     ----------
@@ -151,8 +188,6 @@ def write_trajectory(path: Path | str, trajectory: Trajectory, timestep: float =
 
 def _write_frame(file: TextIO, table: ParticleTable, timestep: int) -> None:
     packing = table.packing
-    if packing.dimension == 3 and _is_flat(packing.centers[:, 2], packing.radii):
-        raise InputError("spheres at one height would be read from a dump as disks: write .csv, .nc or .vtp instead")
     flags = [("pp" if flag else "ff") for flag in packing.box.periodic]
     lengths = list(packing.box.lengths)
     if packing.dimension == 2:  # LAMMPS keeps a slab of unit height about a plane, periodic across it
@@ -170,128 +205,156 @@ def _write_frame(file: TextIO, table: ParticleTable, timestep: int) -> None:
     file.write(f"ITEM: BOX BOUNDS {' '.join(flags)}\n")
     file.writelines(f"{low!r} {high!r}\n" for low, high in bounds)
     file.write(f"ITEM: ATOMS {names}\n")
-    rows = zip(ids.tolist(), *(column.tolist() for column in columns), strict=True)
-    file.writelines(f"{number} 1 {' '.join(map(repr, row))}\n" for number, *row in rows)
+    types = ["1"] * packing.count if table.types is None else table.types.tolist()
+    rows = zip(ids.tolist(), types, *(column.tolist() for column in columns), strict=True)
+    file.writelines(f"{number} {kind} {' '.join(map(repr, row))}\n" for number, kind, *row in rows)
 
 
-def _frames(path: Path) -> Iterator[_Frame]:
-    """Frames of the file, one after the other."""
+def frame_rows(path: Path, frame: Frame, scale: float = 1.0, radius_column: str | None = None) -> Rows:
+    """Rows of one frame, sorted by id, in metres.
+
+    Raises
+    ------
+    InputError
+        If the frame is cut short, or its box or table is not understood.
+    """
+    place = f"{path}" if frame.number == 0 else f"{path}, frame {frame.number}"
+    block = frame.blocks.get("ATOMS")
+    _step(path, frame)
+    if block is None or "BOX BOUNDS" not in frame.blocks:
+        _refuse_incomplete(path, frame)
+        raise AssertionError  # the call above raises
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(f"there is no file {path}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} cannot be read as a text dump: {error}") from None
-    lines = iter(text.splitlines(keepends=True))
-    number = 0
-    for line in lines:
-        if not line.strip():
-            continue
-        if line.strip() != "ITEM: TIMESTEP":
-            found = line.rstrip()[:40]
-            raise InputError(f"{path} is not a LAMMPS text dump: expected 'ITEM: TIMESTEP', found {found!r}")
-        try:
-            yield _frame(lines)
-        except (StopIteration, ValueError, IndexError):
-            raise InputError(f"{path}: frame {number} is cut short or malformed") from None
-        number += 1
-    if not number:
-        raise InputError(f"{path} holds no frames")
+        count = frame.number_of("NUMBER OF ATOMS")
+    except ValueError:
+        raise InputError(f"{path}: frame {frame.number} is cut short or malformed") from None
+    if count == 0:
+        raise InputError(f"{place} holds no particles")
+    layout = find_layout(place, block.words, radius_column)
+    reader = ColumnReader(place, layout)
+    with open_stream(path) as stream:
+        found = 0
+        for lines in batches(table_lines(stream, block)):
+            if reader.rows + len(lines) > count:
+                lines = _without_blank_end(lines, count - reader.rows)  # noqa: PLW2901
+            if reader.rows + len(lines) == count and not lines[-1].endswith("\n"):
+                raise InputError(
+                    f"{path}: frame {frame.number} is cut short or malformed: its last line has no end, "
+                    "so a number may have lost digits"
+                )
+            found = reader.rows + len(lines)
+            if found > count or (found < count and len(lines) < BATCH):
+                break
+            reader.feed(lines)
+    if reader.rows != count:
+        raise InputError(
+            f"{path}: frame {frame.number} is cut short or malformed: {count} particles are announced, {found} found"
+        )
+    return _sorted_rows(place, frame, reader, scale)
 
 
-def _frame(lines: Iterator[str]) -> _Frame:
-    timestep = int(next(lines))
-    if next(lines).strip() != "ITEM: NUMBER OF ATOMS":
-        raise ValueError
-    count = int(next(lines))
-    box_header = next(lines).split()
-    if box_header[:3] != ["ITEM:", "BOX", "BOUNDS"]:
-        raise ValueError
-    box_lines = [next(lines) for _ in range(3)]
-    columns = next(lines).split()
-    if columns[:2] != ["ITEM:", "ATOMS"]:
-        raise ValueError
-    atoms = [next(lines) for _ in range(count)]
-    if atoms and not atoms[-1].endswith("\n"):  # a number may have lost its last digits
-        raise ValueError
-    return _Frame(timestep, box_header[3:], box_lines, columns[2:], atoms)
+def _without_blank_end(lines: list[str], most: int) -> list[str]:
+    """The lines without blank ones after the last row."""
+    return lines[: max(most, 0)] if not "".join(lines[max(most, 0) :]).strip() else lines
 
 
-def _particles(path: Path, frame: _Frame) -> ParticleTable:
-    if not frame.atoms:
-        raise InputError(f"{path}: the frame at step {frame.timestep} holds no particles")
-    if "xy" in frame.box_header:
-        raise InputError(f"{path} has a triclinic box; only boxes with right angles are understood")
-    bounds = _bounds(path, frame)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # an empty table is refused below, in our words
-            values = np.loadtxt(io.StringIO("".join(frame.atoms)), ndmin=2)
-    except ValueError as error:
-        raise InputError(f"{path}: the frame at step {frame.timestep} is not a table of numbers: {error}") from None
-    if len(values) != len(frame.atoms):
-        raise InputError(f"{path}: the frame at step {frame.timestep} has {len(frame.atoms) - len(values)} empty lines")
-    if values.shape[1] != len(frame.columns):
-        raise InputError(f"{path}: {len(frame.columns)} columns are named, {values.shape[1]} found")
-    columns = dict(zip(frame.columns, values.T, strict=True))
-    ids = None
-    if "id" in columns:
-        order = np.argsort(columns["id"], kind="stable")
-        columns = {name: column[order] for name, column in columns.items()}
-        ids = columns["id"].astype(np.int64)
-    radii = _radii(path, columns)
-    positions = [
-        _positions(path, columns, axis, bounds[axis]) for axis in range(3) if axis < 2 or "z" in _spelled(columns)
-    ]
-    flat = len(positions) == 2 or _is_flat(positions[2], radii)
-    dimension = 2 if flat else 3
-    box = Box(
-        tuple(float(high - low) for low, high in bounds[:dimension]),
-        tuple(flag.startswith("p") for flag in (frame.box_header or ["ff"] * 3)[:dimension]),
+def _sorted_rows(place: str, frame: Frame, reader: ColumnReader, scale: float) -> Rows:
+    bounds, periodic = _box(place, frame)
+    layout = reader.layout
+    radii = reader.column("radius")
+    assert radii is not None
+    positions = reader.positions()
+    for axis in np.flatnonzero(layout.scaled):
+        low, high = bounds[axis]
+        positions[:, axis] = low + positions[:, axis] * (high - low)
+    columns: dict[str, Any] = {
+        "ids": reader.ids(),
+        "types": reader.types(),
+        "conductivity": reader.column("conductivity"),
+        "temperature": reader.column("temperature"),
+    }
+    order = slice(None) if columns["ids"] is None else np.argsort(columns["ids"], kind="stable")
+    notes: tuple[str, ...] = ()
+    if scale != 1.0:
+        notes = (f"lengths are converted to metres from the units of the dump (1 = {scale:g} m)",)
+    return Rows(
+        place=place,
+        positions=scale * positions[order],
+        radii=(0.5 * scale if layout.halved else scale) * radii[order],
+        bounds=scale * bounds,
+        periodic=periodic,
+        printed=_printed(reader, bounds, scale),
+        scale=scale,
+        notes=notes,
+        **{name: None if values is None else values[order] for name, values in columns.items()},
     )
-    centers = np.stack(positions[:dimension], axis=1) - bounds[:dimension, 0]
-    return ParticleTable(ParticlePacking(centers, radii, box), columns.get("conductivity"), ids)
 
 
-def _bounds(path: Path, frame: _Frame) -> NDArray[np.float64]:
-    """Lower and upper bound of the box along each axis, shape (3, 2)."""
+def _printed(reader: ColumnReader, bounds: NDArray[np.float64], scale: float) -> PrintedColumns | None:
+    """How finely positions and radii are printed, scaled positions in parts of the box."""
+    digits = reader.digits()
+    if digits is None:
+        return None
+    positions = []
+    for axis, scaled in enumerate(reader.layout.scaled):
+        low, high = bounds[axis]
+        factor, offset = ((high - low) * scale, low * scale) if scaled else (scale, 0.0)
+        positions.append(PrintedColumn(digits[AXES[axis]], factor, offset))
+    radius = PrintedColumn(digits["radius"], (0.5 if reader.layout.halved else 1.0) * scale)
+    return PrintedColumns(tuple(positions), radius, REMEDY)
+
+
+def _refuse_incomplete(path: Path, frame: Frame) -> None:
+    if "ENTRIES" in frame.blocks:
+        raise InputError(
+            f"{path} is a dump of contacts (ITEM: ENTRIES), not of particles: give the dump of the particles, "
+            "and this one with --contacts"
+        )
+    raise InputError(f"{path}: frame {frame.number} is cut short or malformed")
+
+
+def _step(path: Path, frame: Frame) -> int:
+    if "TIMESTEP" not in frame.blocks:
+        found = next(iter(frame.blocks), "")
+        raise InputError(f"{path} is not a LAMMPS text dump: expected 'ITEM: TIMESTEP', found 'ITEM: {found}'")
     try:
-        bounds = np.array([[float(word) for word in line.split()[:2]] for line in frame.box_lines])
-        valid = bounds.shape == (3, 2) and bool(np.isfinite(bounds).all()) and len(frame.box_header) in (0, 3)
+        return frame.number_of("TIMESTEP")
+    except ValueError:
+        raise InputError(f"{path}: frame {frame.number} is cut short or malformed") from None
+
+
+def _scale(path: Path, frames: list[Frame]) -> float:
+    """Metres per unit of length; LAMMPS names its units in the first frame only."""
+    block = next((frame.blocks["UNITS"] for frame in frames if "UNITS" in frame.blocks), None)
+    if block is None:
+        return 1.0
+    style = block.lines[0].strip() if block.lines else ""
+    if style not in UNITS:
+        raise InputError(f"{path}: the units {style!r} are unknown, expected one of {', '.join(UNITS)}")
+    return UNITS[style]
+
+
+def _box(place: str, frame: Frame) -> tuple[NDArray[np.float64], tuple[bool, ...]]:
+    """Faces of the box, shape (3, 2), and its periodic axes; a tilted box is refused."""
+    block = frame.blocks["BOX BOUNDS"]
+    words = list(block.words)
+    if words[:2] == ["abc", "origin"]:
+        raise InputError(
+            f"{place} has a general triclinic box; only boxes with right angles along x, y, z are understood"
+        )
+    tilted = words[:3] == ["xy", "xz", "yz"]
+    flags = (words[3:] if tilted else words) or ["ff"] * 3
+    width = 3 if tilted else 2
+    try:
+        numbers = np.array([[float(word) for word in line.split()[:width]] for line in block.lines[:3]])
+        valid = numbers.shape == (3, width) and bool(np.isfinite(numbers).all()) and len(flags) == 3
     except ValueError:
         valid = False
     if not valid:
-        found = "; ".join(line.strip() for line in frame.box_lines)
-        raise InputError(f"{path}: the box at step {frame.timestep} needs two numbers an axis, found {found[:80]!r}")
-    return bounds
-
-
-def _is_flat(heights: NDArray[np.float64], radii: NDArray[np.float64]) -> bool:
-    return bool(np.ptp(heights) <= FLAT * radii.max())
-
-
-def _spelled(columns: dict[str, NDArray[np.float64]]) -> set[str]:
-    """Axes for which there is a position column in any spelling."""
-    return {axis for axis in AXES for ending in ("", "u", "s", "su") if axis + ending in columns}
-
-
-def _positions(
-    path: Path, columns: dict[str, NDArray[np.float64]], axis: int, bounds: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Coordinates along an axis: ``x``, unwrapped ``xu``, or scaled to the box ``xs``, ``xsu``."""
-    name = AXES[axis]
-    for ending in ("", "u"):
-        if name + ending in columns:
-            return columns[name + ending]
-    for ending in ("s", "su"):
-        if name + ending in columns:
-            return bounds[0] + columns[name + ending] * (bounds[1] - bounds[0])
-    raise InputError(f"{path} has no column of {name} positions ({name}, {name}u, {name}s); found {', '.join(columns)}")
-
-
-def _radii(path: Path, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    if "radius" in columns:
-        return columns["radius"]
-    if "diameter" in columns:
-        return 0.5 * columns["diameter"]
-    raise InputError(f"{path} has neither a radius nor a diameter column; found {', '.join(columns)}")
+        found = "; ".join(line.strip() for line in block.lines[:3])
+        raise InputError(f"{place}: the box needs {width} numbers per axis, found {found[:80]!r}")
+    bounds = numbers[:, :2]
+    if tilted and numbers[:, 2].any():
+        tilts = ", ".join(f"{name} = {value:g}" for name, value in zip(words, numbers[:, 2].tolist(), strict=False))
+        raise InputError(f"{place} has a tilted (triclinic) box ({tilts}); only boxes with right angles are understood")
+    return bounds, tuple(flag.startswith("p") for flag in flags)

@@ -1,59 +1,100 @@
-"""Particle files of every format: written by their ending, read by their first bytes."""
+"""Particle files of every format: written by their ending, read by their first bytes. A format is one row."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError
-from etc_engine.particle_files.csv_files import ParticleTable, read_csv, write_csv
-from etc_engine.particle_files.dumps import read_dump, write_dump
-from etc_engine.particle_files.netcdf import read_netcdf, write_netcdf
-from etc_engine.particle_files.vtp import read_vtp, write_vtp
+from etc_engine.particle_files.csv_files import csv_rows, write_csv
+from etc_engine.particle_files.dumps import count_frames as count_dump
+from etc_engine.particle_files.dumps import dump_rows, write_dump
+from etc_engine.particle_files.mercury import count_mercury, is_mercury, mercury_rows
+from etc_engine.particle_files.netcdf import netcdf_rows, write_netcdf
+from etc_engine.particle_files.sample import Rows, Sample, make_table
+from etc_engine.particle_files.streams import read_opening, seekable_copy
+from etc_engine.particle_files.table import ParticleTable
+from etc_engine.particle_files.vtp import LEGACY, XML, vtk_rows, write_vtp
+from etc_engine.particle_files.xyz import count_xyz, is_xyz, xyz_rows
+from etc_engine.particle_files.yade import is_yade, yade_rows
 
 Attributes = Mapping[str, Any]
 """Where a packing comes from: seed, command, ..."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FileFormat:
     """A format of particle files.
 
     Parameters
     ----------
     name : str
-    endings : tuple of str
-        Of the names of files to write.
-    openings : tuple of bytes
-        First bytes of files to read, after white space; none for CSV, which is what has no others' opening.
+    recognises : callable
+        First bytes of a file, without white space before them -> whether it is of this format.
+    rows : callable
+        (path, sample) -> rows of one frame.
     brings_box : bool
         Whether the file holds the box.
-    has_frames : bool
-        Whether a file may hold several packings.
+    count : callable, optional
+        path -> number of frames, where a file may hold several.
+    endings : tuple of str
+        Of the names of files to write; none where the format is only read.
+    write : callable, optional
+        (path, table, attributes) -> None.
     """
 
     name: str
-    endings: tuple[str, ...]
-    openings: tuple[bytes, ...]
+    recognises: Callable[[bytes], bool]
+    rows: Callable[[Path, Sample], Rows]
     brings_box: bool = True
-    has_frames: bool = False
+    count: Callable[[Path], int] | None = None
+    endings: tuple[str, ...] = ()
+    write: Callable[[Path, ParticleTable, Attributes], None] | None = None
+
+    @property
+    def has_frames(self) -> bool:
+        """Whether a file may hold several packings."""
+        return self.count is not None
 
 
-CSV = FileFormat("CSV file", (".csv",), (), brings_box=False)
-DUMP = FileFormat("dump", (".dump", ".lammpstrj"), (b"ITEM:",), has_frames=True)
-NETCDF = FileFormat("netCDF file", (".nc",), (b"\x89HDF", b"CDF"))
-VTP = FileFormat("VTK file", (".vtp",), (b"<?xml", b"<VTKFile"))
-FORMATS = (CSV, DUMP, NETCDF, VTP)
-
-_WRITERS: dict[FileFormat, Callable[[Path, ParticleTable, Attributes], None]] = {
-    CSV: lambda path, table, _: write_csv(path, table),
-    DUMP: lambda path, table, _: write_dump(path, table),
-    NETCDF: write_netcdf,
-    VTP: lambda path, table, _: write_vtp(path, table),
-}
+DUMP = FileFormat(
+    "dump",
+    lambda opening: opening.startswith(b"ITEM:"),
+    dump_rows,
+    count=count_dump,
+    endings=(".dump", ".lammpstrj"),
+    write=lambda path, table, _: write_dump(path, table),
+)
+NETCDF = FileFormat(
+    "netCDF file",
+    lambda opening: opening.startswith((b"\x89HDF", b"CDF")),
+    lambda path, _: netcdf_rows(path),
+    endings=(".nc",),
+    write=write_netcdf,
+)
+VTP = FileFormat(
+    "VTK file",
+    lambda opening: opening.startswith(XML),
+    vtk_rows,
+    endings=(".vtp",),
+    write=lambda path, table, _: write_vtp(path, table),
+)
+LEGACY_VTK = FileFormat("VTK file (legacy)", lambda opening: opening.startswith(LEGACY), vtk_rows, brings_box=False)
+YADE = FileFormat("YADE text file", is_yade, yade_rows, brings_box=False)
+XYZ = FileFormat("XYZ file", is_xyz, xyz_rows, count=count_xyz)
+MERCURY = FileFormat("MercuryDPM data file", is_mercury, mercury_rows, count=count_mercury)
+CSV = FileFormat(
+    "CSV file",
+    lambda _: True,  # whatever nothing else recognises; its reader refuses what is no table
+    lambda path, sample: csv_rows(path, sample.radius_column),
+    brings_box=False,
+    endings=(".csv",),
+    write=lambda path, table, _: write_csv(path, table),
+)
+FORMATS = (DUMP, NETCDF, VTP, LEGACY_VTK, YADE, XYZ, MERCURY, CSV)
 
 
 def format_to_write(path: Path | str) -> FileFormat:
@@ -73,21 +114,14 @@ def format_to_write(path: Path | str) -> FileFormat:
     for candidate in FORMATS:
         if ending in candidate.endings:
             return candidate
-    known = ", ".join(ending for candidate in FORMATS for ending in candidate.endings)
+    known = ", ".join(sorted(ending for candidate in FORMATS for ending in candidate.endings))
     raise InputError(f"packings are written as {known}: found {str(path)!r}")
 
 
 def format_to_read(path: Path | str) -> FileFormat:
     """Format of a file to read, by its first bytes; CSV where they say nothing else, or there is no such file."""
-    try:
-        with Path(path).open("rb") as file:
-            opening = file.read(64).removeprefix(b"\xef\xbb\xbf").lstrip()
-    except OSError:
-        opening = b""  # the reader says what is wrong
-    for candidate in FORMATS:
-        if opening.startswith(candidate.openings):
-            return candidate
-    return CSV
+    opening = read_opening(path).lstrip()
+    return next(candidate for candidate in FORMATS if candidate.recognises(opening))
 
 
 def write_particles(path: Path | str, table: ParticleTable, attributes: Attributes | None = None) -> None:
@@ -105,19 +139,27 @@ def write_particles(path: Path | str, table: ParticleTable, attributes: Attribut
     ------
     InputError, OutputError
     """
-    _WRITERS[format_to_write(path)](Path(path), table, attributes or {})
+    write = format_to_write(path).write
+    assert write is not None  # only formats that are written have endings
+    write(Path(path), table, attributes or {})
 
 
-def read_particles(path: Path | str, box: Box | None = None, frame: int | None = None) -> ParticleTable:
-    """Read particles from a CSV file, a LAMMPS/LIGGGHTS dump, netCDF or VTK PolyData, told apart by their content.
+def read_particles(
+    path: Path | str, box: Box | None = None, frame: int | None = None, sample: Sample | None = None
+) -> ParticleTable:
+    """Particles of a file of any known format, told apart by their content: the one door to read them.
 
     Parameters
     ----------
     path : path
+        LAMMPS or LIGGGHTS dump, CSV or another table of text, netCDF or VTK of this engine, VTK of others, extended
+        XYZ, YADE text, MercuryDPM data; text may be compressed by gzip or Zstandard; ``-`` is standard input.
     box : Box, optional
-        Needed by a CSV file; the others bring their own.
+        Needed by a file without a box; replaces the file's.
     frame : int, optional
-        Frame of a dump, from 0; the last one by default.
+        Frame of a file with several, from 0; the last one by default.
+    sample : Sample, optional
+        All that may be said of the wanted part: box, periodic axes, crop, dimension, frame, column of radii.
 
     Returns
     -------
@@ -126,19 +168,38 @@ def read_particles(path: Path | str, box: Box | None = None, frame: int | None =
     Raises
     ------
     InputError, GeometryError
-        If the file is missing or not understood, or the box or the frame does not go with its format.
+        If the file is missing or not understood, or box, crop or frame do not fit it.
     """
-    kind = format_to_read(path)
-    if box is not None and kind.brings_box:
-        raise InputError(f"{path} is a {kind.name} that brings its own box: leave the box out")
-    if frame is not None and not kind.has_frames:
-        raise InputError(f"a frame goes with a dump; {path} is none")
-    if kind is DUMP:
-        return read_dump(path, -1 if frame is None else frame)
-    if kind is NETCDF:
-        return read_netcdf(path)
-    if kind is VTP:
-        return read_vtp(path)
-    if box is None:
-        raise InputError(f"{path} is a CSV file, which has no box: give one")
-    return read_csv(path, box)
+    chosen = sample or Sample()
+    if box is not None:
+        chosen = replace(chosen, box=tuple((0.0, length) for length in box.lengths), periodic=box.periodic_axes)
+    if frame is not None:
+        chosen = replace(chosen, frame=frame)
+    with seekable_copy(path) as place:
+        kind = format_to_read(place)
+        if chosen.frame is not None and not kind.has_frames:
+            raise InputError(f"{path} is a {kind.name}, which holds one packing: leave the frame out")
+        return make_table(kind.rows(place, chosen), chosen)
+
+
+def read_rows(path: Path | str, sample: Sample | None = None) -> Rows:
+    """Rows of one frame of a file of any known format, without asking for a box.
+
+    Raises
+    ------
+    InputError
+    """
+    with seekable_copy(path) as place:
+        return format_to_read(place).rows(place, sample or Sample())
+
+
+def count_frames(path: Path | str) -> int:
+    """Number of packings in a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    count = format_to_read(path).count
+    return 1 if count is None else count(Path(path))

@@ -10,8 +10,8 @@ import numpy as np
 
 from etc_engine.box import AXES, Box, parse_periodic
 from etc_engine.errors import InputError
-from etc_engine.packing.particles import ParticlePacking
-from etc_engine.particle_files.csv_files import ParticleTable
+from etc_engine.particle_files.sample import Rows, Sample, make_table
+from etc_engine.particle_files.table import ParticleTable
 
 if TYPE_CHECKING:
     import xarray
@@ -42,13 +42,18 @@ def packing_dataset(table: ParticleTable, attributes: Mapping[str, Any] | None =
         name: ("particle", values, {"long_name": meaning, "units": units})
         for name, (values, units, meaning) in data.items()
     }
+    if table.types is not None:
+        variables["type"] = ("particle", table.types.astype(object), {"long_name": "type of the particle"})
     general = {
         "Conventions": "CF-1.11",
         "title": f"packing of {packing.count} {'disks' if packing.dimension == 2 else 'spheres'}",
         "box": list(packing.box.lengths),
         "periodic": packing.box.periodic_axes,
     }
-    return xarray.Dataset(variables, attrs=general | dict(attributes or {}))
+    dataset = xarray.Dataset(variables, attrs=general | dict(attributes or {}))
+    if table.ids is None:
+        return dataset
+    return dataset.assign_coords(particle=("particle", table.ids, {"long_name": "id of the particle in its file"}))
 
 
 def write_netcdf(path: Path | str, table: ParticleTable, attributes: Mapping[str, Any] | None = None) -> None:
@@ -58,7 +63,7 @@ def write_netcdf(path: Path | str, table: ParticleTable, attributes: Mapping[str
     dataset.to_netcdf(path, engine="netcdf4", encoding=plain)
 
 
-def read_netcdf(path: Path | str) -> ParticleTable:
+def read_netcdf(path: Path | str, sample: Sample | None = None) -> ParticleTable:
     """Particles from a netCDF file with their box, as ``pack`` and ``solve`` write them.
 
     Raises
@@ -66,9 +71,18 @@ def read_netcdf(path: Path | str) -> ParticleTable:
     InputError, GeometryError
         If the file is missing or no netCDF, a variable or attribute is missing, or a particle is not valid.
     """
+    return make_table(netcdf_rows(Path(path)), sample or Sample())
+
+
+def netcdf_rows(path: Path) -> Rows:
+    """Rows of a netCDF file.
+
+    Raises
+    ------
+    InputError
+    """
     import xarray
 
-    path = Path(path)
     try:
         with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
             dataset.load()
@@ -84,13 +98,19 @@ def read_netcdf(path: Path | str) -> ParticleTable:
             f"{path} holds no packing: a {box.dimension}D box needs {', '.join(names)} along the dimension "
             f"'particle', found no {', '.join(missing)}"
         )
-    columns = {
-        name: np.asarray(dataset[name].values, dtype=np.float64)
-        for name in (*names, "conductivity")
-        if name in dataset and dataset[name].dims == ("particle",)
-    }
-    centers = np.stack([columns[axis] for axis in AXES[: box.dimension]], axis=1)
-    return ParticleTable(ParticlePacking(centers, columns["radius"], box), columns.get("conductivity"))
+    held = {name: np.asarray(dataset[name].values) for name in dataset if dataset[name].dims == ("particle",)}
+    ids = dataset.coords["particle"].values if "particle" in dataset.coords else held.get("id")
+    return Rows(
+        place=str(path),
+        positions=np.stack([held[axis].astype(np.float64) for axis in AXES[: box.dimension]], axis=1),
+        radii=held["radius"].astype(np.float64),
+        bounds=np.stack([np.zeros(box.dimension), np.array(box.lengths)], axis=1),
+        periodic=box.periodic,
+        planar=box.dimension == 2,
+        conductivity=held["conductivity"].astype(np.float64) if "conductivity" in held else None,
+        ids=None if ids is None else ids.astype(np.int64),
+        types=held["type"].astype(np.str_) if "type" in held else None,
+    )
 
 
 def _box(path: Path, attributes: Mapping[str, Any]) -> Box:

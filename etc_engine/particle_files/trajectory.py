@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.table import ParticleTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +21,13 @@ class Trajectory:
     times : ndarray, shape (f,) [s]
         When each packing is there, increasing.
     packings : tuple of ParticlePacking
-        One a time, of the same number of particles in the same box.
+        One per time, of the same number of particles in the same box.
     ids : ndarray of int64, shape (n,), optional
         Numbers of the particles; their rows by default.
     conductivity : ndarray, shape (n,), optional [W/(m K)]
         Conductivity of each particle, where its file gives it.
+    tables : tuple of ParticleTable, optional
+        What the file says of each frame, where the packings come from one.
 
     Raises
     ------
@@ -43,12 +46,13 @@ class Trajectory:
     packings: tuple[ParticlePacking, ...]
     ids: NDArray[np.int64] | None = None
     conductivity: NDArray[np.float64] | None = None
+    tables: tuple[ParticleTable, ...] = ()
 
     def __post_init__(self) -> None:
         times, packings = np.array(self.times, dtype=np.float64), tuple(self.packings)
         if not packings or times.shape != (len(packings),):
             raise InputError(
-                f"a trajectory needs one time a packing, found {times.size} times, {len(packings)} packings"
+                f"a trajectory needs one time per packing, found {times.size} times, {len(packings)} packings"
             )
         if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
             late = int(np.flatnonzero(~(np.diff(times) > 0.0))[0]) + 1 if times.size > 1 else 0

@@ -11,10 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from etc_engine.box import Box, parse_periodic
+from etc_engine.box import AXES, Box, parse_periodic
 from etc_engine.errors import InputError, OutputError
-from etc_engine.packing.particles import ParticlePacking
-from etc_engine.particle_files.csv_files import ParticleTable
+from etc_engine.particle_files.columns import find_layout
+from etc_engine.particle_files.digits import EXACT, SINGLE, Digits, PrintedColumn, PrintedColumns
+from etc_engine.particle_files.sample import Rows, Sample, make_table
+from etc_engine.particle_files.streams import read_opening
+from etc_engine.particle_files.table import ParticleTable
+
+LEGACY = b"# vtk DataFile"
+XML = (b"<?xml", b"<VTKFile")
 
 
 def write_vtp(path: Path | str, table: ParticleTable) -> None:
@@ -58,37 +64,105 @@ def write_vtp(path: Path | str, table: ParticleTable) -> None:
             raise OutputError(f"cannot write {path}")
 
 
-def read_vtp(path: Path | str) -> ParticleTable:
-    """Particles from a ``.vtp`` file as :func:`write_vtp` lays it out.
+def read_vtp(path: Path | str, sample: Sample | None = None) -> ParticleTable:
+    """Particles from a VTK file: ``.vtp`` of this engine or of others, ``.vtu``, or the legacy format.
 
     Raises
     ------
     InputError, GeometryError
         If the library ``vtk`` is missing, or the file is missing or holds something else.
     """
-    path = Path(path)
-    core, _, files, arrays = _library()
+    chosen = sample or Sample()
+    return make_table(vtk_rows(Path(path), chosen), chosen)
+
+
+def vtk_rows(path: Path, sample: Sample) -> Rows:
+    """Rows of a VTK file: its points, and their data ``radius``.
+
+    Raises
+    ------
+    InputError
+
+    Notes
+    -----
+    Files of this engine hold the box; files of others do not, and often hold points in single precision, which
+    counts as a printed step of 1.2e-7 of each coordinate.
+    """
+    data = _points(path)
+    arrays = _library()[3]
+    places = data.GetPoints().GetData()
+    numbers = data.GetPointData().GetNumberOfArrays()
+    held = [data.GetPointData().GetAbstractArray(k) for k in range(numbers)]
+    columns = {array.GetName(): array for array in held if array is not None and array.GetNumberOfComponents() == 1}
+    layout = find_layout(str(path), [*AXES, *map(str, columns)], sample.radius_column)
+    names = [*AXES, *columns]
+    radius = columns[names[layout.radius]]
+    found = {key: columns[names[column]] for key, column in layout.others.items()}
+    bounds, periodic = _own_box(data, arrays)
+    half = 0.5 if layout.halved else 1.0
+    return Rows(
+        place=str(path),
+        positions=arrays.vtk_to_numpy(places).astype(np.float64)[:, : 3 if bounds is None else len(bounds)],
+        radii=half * arrays.vtk_to_numpy(radius).astype(np.float64),
+        bounds=bounds,
+        periodic=periodic,
+        planar=None if bounds is None else len(bounds) == 2,
+        printed=_single(places, radius),
+        **{key: _values(key, array, arrays) for key, array in found.items()},
+    )
+
+
+def _points(path: Path) -> Any:
+    """The data set of points of a file in XML or the legacy format."""
+    core, _, files, _ = _library()
     if not path.is_file():
         raise InputError(f"there is no file {path}")
-    reader = files.vtkXMLPolyDataReader()
+    opening = read_opening(path)
+    if opening.startswith(LEGACY):
+        reader = import_module("vtkmodules.vtkIOLegacy").vtkGenericDataObjectReader()
+        reader.ReadAllScalarsOn()
+        reader.ReadAllFieldsOn()
+    elif b"UnstructuredGrid" in opening:
+        reader = files.vtkXMLUnstructuredGridReader()
+    else:
+        reader = files.vtkXMLPolyDataReader()
     reader.SetFileName(str(path))
     with _silent(core):
         reader.Update()
-    data = reader.GetOutput()
-    if reader.GetErrorCode() or not data.GetNumberOfPoints():
-        raise InputError(f"{path} cannot be read as VTK PolyData, or has no points")
-    radius, conductivity = (data.GetPointData().GetArray(name) for name in ("radius", "conductivity"))
+        data = reader.GetOutput()
+    points = data.GetPoints() if data is not None and hasattr(data, "GetPoints") else None
+    if reader.GetErrorCode() or points is None or not points.GetNumberOfPoints():
+        raise InputError(f"{path} cannot be read as VTK points (PolyData or UnstructuredGrid), or has no points")
+    return data
+
+
+def _own_box(data: Any, arrays: Any) -> tuple[Any, tuple[bool, ...] | None]:
+    """Faces of the box and its periodic axes, where this engine wrote the file."""
     lengths, word = (data.GetFieldData().GetAbstractArray(name) for name in ("box", "periodic"))
-    if radius is None or lengths is None or word is None:
-        raise InputError(
-            f"{path} holds no packing: point data 'radius' and field data 'box' and 'periodic' are needed, "
-            "as 'etc-engine pack -o packing.vtp' writes them"
-        )
-    edges = tuple(arrays.vtk_to_numpy(lengths).tolist())
-    box = Box(edges, parse_periodic(word.GetValue(0), len(edges)))
-    centers = arrays.vtk_to_numpy(data.GetPoints().GetData())[:, : box.dimension]
-    packing = ParticlePacking(centers, arrays.vtk_to_numpy(radius), box)
-    return ParticleTable(packing, None if conductivity is None else np.array(arrays.vtk_to_numpy(conductivity)))
+    if lengths is None or word is None:
+        return None, None
+    edges = arrays.vtk_to_numpy(lengths)
+    box = Box(tuple(edges.tolist()), parse_periodic(str(word.GetValue(0)), len(edges)))
+    return np.stack([np.zeros(box.dimension), np.array(box.lengths)], axis=1), box.periodic
+
+
+def _single(places: Any, radius: Any) -> PrintedColumns | None:
+    """Steps of numbers in single precision."""
+    if places.GetDataTypeSize() != 4 and radius.GetDataTypeSize() != 4:
+        return None
+    digits = {4: Digits(0, 0, SINGLE)}
+    exact = Digits(EXACT, EXACT)
+    point = PrintedColumn(digits.get(places.GetDataTypeSize(), exact))
+    return PrintedColumns(
+        (point,) * 3, PrintedColumn(digits.get(radius.GetDataTypeSize(), exact)), "write points in double precision"
+    )
+
+
+def _values(key: str, array: Any, arrays: Any) -> Any:
+    """A column of point data, as its key wants it."""
+    if key == "types":
+        return np.array([str(array.GetVariantValue(k).ToString()) for k in range(array.GetNumberOfValues())])
+    return arrays.vtk_to_numpy(array).astype(np.int64 if key == "ids" else np.float64)
 
 
 def require_vtk() -> None:
@@ -119,8 +193,11 @@ def _add(place: Any, name: str, array: Any) -> None:
 def _silent(core: Any) -> Iterator[None]:
     """Without vtk's own words on stderr: what goes wrong is raised."""
     shown = core.vtkObject.GetGlobalWarningDisplay()
+    cutoff = core.vtkLogger.GetCurrentVerbosityCutoff()
     core.vtkObject.SetGlobalWarningDisplay(0)
+    core.vtkLogger.SetStderrVerbosity(core.vtkLogger.VERBOSITY_OFF)
     try:
         yield
     finally:
         core.vtkObject.SetGlobalWarningDisplay(shown)
+        core.vtkLogger.SetStderrVerbosity(core.vtkLogger.ConvertToVerbosity(int(cutoff)))

@@ -142,9 +142,13 @@ def clip_facet(f, planes, count, size, same, tangents, polygon, spare):  # type:
         cut = False
         last_u, last_v = polygon[vertices - 1, 0], polygon[vertices - 1, 1]
         last = a * last_u + b * last_v - t
+        if abs(last) <= same:
+            last = 0.0
         for k in range(vertices):
             u, v = polygon[k, 0], polygon[k, 1]
             side = a * u + b * v - t
+            if abs(side) <= same:
+                side = 0.0  # a line along an edge must not cut it in two
             if (side <= 0.0) != (last <= 0.0):
                 part = last / (last - side)
                 spare[kept, 0], spare[kept, 1] = last_u + part * (u - last_u), last_v + part * (v - last_v)

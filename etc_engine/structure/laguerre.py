@@ -141,3 +141,34 @@ def laguerre_facets(packing: ParticlePacking) -> LaguerreFacets:
         what[wall, 1:4],
         what[wall, 4],
     )
+
+
+def refuse_hidden(facets: LaguerreFacets) -> None:
+    """Refuse particles without a cell, and particles whose centre lies outside their own cell.
+
+    Raises
+    ------
+    GeometryError
+        Naming the first particle, and the neighbour or wall that lies beyond its centre.
+    """
+    empty = np.flatnonzero(facets.volumes <= 0.0)
+    if empty.size:
+        raise GeometryError(
+            f"{empty.size} particle(s) own no Laguerre cell (the first: particle {empty[0]}): they are hidden inside "
+            f"larger neighbours; remove them"
+        )
+    outside = np.argwhere(facets.distances <= 0.0)
+    if outside.size:
+        row, side = outside[0]
+        here, there = facets.pairs[row, side], facets.pairs[row, 1 - side]
+        raise GeometryError(
+            f"the centre of particle {here} lies outside its own Laguerre cell, beyond its facet with particle "
+            f"{there}: they overlap too far; remove one of them or let them overlap less"
+        )
+    beyond = np.flatnonzero(facets.wall_distances <= 0.0)
+    if beyond.size:
+        row = beyond[0]
+        raise GeometryError(
+            f"the centre of particle {facets.wall_cells[row]} lies on or beyond wall {facets.walls[row]}; "
+            f"move it inside"
+        )

@@ -8,8 +8,6 @@ import pytest
 from etc_engine.errors import InputError
 from etc_engine.laws.contact import (
     Elastic,
-    Roughness,
-    area_resistance,
     effective_modulus,
     effective_radius,
     half_width_from_force,
@@ -18,12 +16,15 @@ from etc_engine.laws.contact import (
     line_force,
     mean_field_force,
     mean_field_line_force,
-    micro_gap_conductance,
+    mean_pressure,
+    pair_modulus,
     radius_from_area,
     radius_from_force,
+    reach_from_force,
+    reach_from_overlap,
     softening_factor,
-    solid_spot_conductance,
 )
+from etc_engine.laws.roughness import Roughness, area_resistance, micro_gap_conductance, solid_spot_conductance
 
 
 def test_sphere_on_a_rigid_plane_published():
@@ -62,6 +63,23 @@ def test_softened_run_gives_the_radius_of_the_true_material():
     delta = np.array([1e-7, 1e-6])
     true = radius_from_force(hertz_force(delta, radius, soft), radius, hard)
     np.testing.assert_allclose(true, hertz_radius(delta, radius) * softening_factor(soft, hard), rtol=1e-12)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_softened_overlap_keeps_the_force(dimension):
+    """Force of the run by its own modulus, then the width of the true material under it."""
+    radius, soft, hard = 2.5e-4, 1e8, 3e10
+    delta = np.array([1e-7, 1e-6])
+    force = hertz_force(delta, radius, soft) if dimension == 3 else line_force(delta, soft)
+    expected = reach_from_force(force, radius, hard, dimension)
+    np.testing.assert_allclose(reach_from_overlap(delta, radius, dimension, soft / hard), expected, rtol=1e-12)
+    area = np.pi * expected**2 if dimension == 3 else 2.0 * expected
+    np.testing.assert_allclose(mean_pressure(expected, radius, hard, dimension), force / area, rtol=1e-12)
+
+
+def test_modulus_of_pairs():
+    one, two = Elastic(60e9, 0.24), Elastic(200e9, 0.3)
+    assert pair_modulus(60e9, 0.24, 200e9, 0.3) == pytest.approx(effective_modulus(one, two), rel=1e-14)
 
 
 def test_lens_is_sqrt2_wider_than_hertz():
@@ -152,3 +170,18 @@ def test_elastic_and_plastic_asperities_are_alike_where_their_pressures_are():
 def test_bad_input_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_grey_exchange():
+    """T^3, black, mirrors, and the linear form against sigma (T_1^4 - T_2^4)."""
+    from etc_engine.laws.radiation import STEFAN_BOLTZMANN, grey_exchange
+
+    assert grey_exchange(600.0, 0.8, 0.8) / grey_exchange(300.0, 0.8, 0.8) == pytest.approx(8.0)
+    assert grey_exchange(500.0, 1.0, 1.0) == pytest.approx(4.0 * STEFAN_BOLTZMANN * 500.0**3)
+    assert grey_exchange(500.0, 0.7, 0.7) == pytest.approx(4.0 * STEFAN_BOLTZMANN * 500.0**3 / (2.0 / 0.7 - 1.0))
+    assert grey_exchange(500.0, [0.0, 0.5], 0.9).tolist()[0] == 0.0
+    exact = STEFAN_BOLTZMANN * (505.0**4 - 495.0**4) / 10.0
+    assert grey_exchange(500.0, 1.0, 1.0) == pytest.approx(exact, rel=2e-4)
+    for bad in ((-5.0, 0.5, 0.5), (500.0, 1.5, 0.5), (500.0, 0.5, -0.1)):
+        with pytest.raises(InputError):
+            grey_exchange(*bad)

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import effective_conductivity
 from etc_engine.errors import InputError
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
-from etc_engine.particle_files.csv_files import ParticleTable
 from etc_engine.particle_files.dumps import count_frames, read_dump, write_dump
+from etc_engine.particle_files.sample import Sample
+from etc_engine.particle_files.table import ParticleTable
+from etc_engine.realization import effective_conductivity
 
 BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
 
@@ -49,8 +51,8 @@ def test_a_real_lammps_bed_brings_its_box():
 
 def test_floating_grains_of_the_bed_are_normal():
     """Before the fall nothing touches enough to conduct; after it the bed wraps around x."""
-    before = effective_conductivity(overlap_contacts(read_dump(BED, 0).packing), axes=(0,))
-    after = effective_conductivity(overlap_contacts(read_dump(BED, 1).packing), axes=(0,))
+    before = effective_conductivity(medium_of(overlap_contacts(read_dump(BED, 0).packing)), axes=(0,))
+    after = effective_conductivity(medium_of(overlap_contacts(read_dump(BED, 1).packing)), axes=(0,))
     assert (before.tensor[0, 0], before.spans[0]) == (0.0, False)
     assert after.spans[0]
     assert after.tensor[0, 0] > 0.01
@@ -65,9 +67,21 @@ def test_scaled_positions_diameters_moved_boxes_and_order_of_ids(dump):
     assert packing.radii.tolist() == [0.25, 0.25]
 
 
-def test_centres_in_one_plane_make_disks(dump):
-    packing = read_dump(dump(LIGGGHTS.replace("0.5 0.9 0.5", "0.5 0.2 0.5"))).packing
-    assert packing.dimension == 2
+def test_the_box_decides_on_the_dimension(dump):
+    """One layer in a 3D box is spheres; only a slab about z = 0 that is periodic along z holds disks."""
+    layer = LIGGGHTS.replace("0.5 0.9 0.5", "0.5 0.2 0.5")
+    table = read_dump(dump(layer))
+    assert table.packing.dimension == 3
+    assert any("taken for spheres" in note for note in table.notes)
+    asked = read_dump(dump(layer), sample=Sample(dimension=2))
+    assert (asked.packing.dimension, asked.notes) == (2, ())
+    slab = layer.replace("ff ss mm", "ff ss pp").replace("0 1\nITEM: ATOMS", "-0.2 0.8\nITEM: ATOMS")
+    table = read_dump(dump(slab))
+    assert table.packing.dimension == 2
+    assert any("taken for disks" in note for note in table.notes)
+    assert read_dump(dump(slab), sample=Sample(dimension=3)).packing.dimension == 3
+    with pytest.raises(InputError, match=r"heights from 0\.2 to 0\.9, so they are no disks"):
+        read_dump(dump(LIGGGHTS), sample=Sample(dimension=2))
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -90,9 +104,13 @@ def test_round_trip_keeps_every_bit(tmp_path, dimension):
         ("0.75 0.5 0.2 0.5 0.0\n1 0.25 0.5 0.9 0.5 0.0\n", "0.75\n", "cut short or malformed"),
         ("diameter", "size", "neither a radius nor a diameter"),
         ("xs ys", "q ys", "no column of x positions"),
-        ("BOUNDS ff", "BOUNDS xy xz yz ff", "triclinic"),
-        ("2 0.75", "2 abc", "not a table of numbers"),
-        ("diameter vx", "diameter", "5 columns are named, 6 found"),
+        (
+            "BOUNDS ff ss mm\n-1 1\n2 4\n0 1",
+            "BOUNDS xy xz yz ff ss mm\n-1 1 0.2\n2 4 0\n0 1 0",
+            "tilted .triclinic. box .xy = 0.2",
+        ),
+        ("2 0.75", "2 abc", "x is not a number: 'abc'"),
+        ("diameter vx", "diameter", "expected 5 values, found 6"),
         ("ATOMS\n2", "ATOMS\n0", "holds no particles|malformed|expected"),
     ],
 )

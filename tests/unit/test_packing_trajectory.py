@@ -84,7 +84,7 @@ def places(*lengths):
 @pytest.mark.parametrize(
     ("times", "packings", "ids", "words"),
     [
-        ([], [], None, "one time a packing"),
+        ([], [], None, "one time per packing"),
         ([0.0], places(1.0, 1.0), None, "found 1 times, 2 packings"),
         ([0.0, 1.0], places(1.0, 2.0), None, "frame 1 has another box"),
         ([0.0], places(1.0), [1, 2], "1 different ids are needed"),

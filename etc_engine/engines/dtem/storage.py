@@ -37,47 +37,69 @@ answer u u^T/(pi kappa) of this harmonic. Taking 6/7 of it away and giving it to
 
 symmetric again. It relaxes at the rate 24/7 = 3.429 kappa/(rho c R^2), where the disk's own is j'_11^2 = 3.390.
 
-**States as temperatures.** The mean and the dipoles are those of three thirds of the disk at angles 0, 120 and 240
-degrees,
+**Spheres.** The same with kappa Lap T = 3 S/(4 pi R^3): T_i - T_o = sum_j h_ij Q_j + S/(20 pi kappa R), and with r cos
+for the dipole, T = [s r^3/(10 kappa) + b r] cos, q = 3 s R^2/10 + kappa b, D = (R/kappa)(q - 8 s R^2/35):
 
-    T_k = T_o + (D_c cos phi_k + D_s sin phi_k)/sqrt(2),      each of the heat capacity rho c V/3:
+    T(R) = (7/8) D + (1/8) q R/kappa,      q = 3 u . Q/(4 pi R^2),      dD/dt = s R/(rho c),
+    (rho c V/5) dD/dt = (7/8) u . Q - (7/8) (4 pi kappa R/3) D,
+
+at the rate 35/8 = 4.375 kappa/(rho c R^2), where the sphere's own is j'_1^2 = 4.333. The law of the dimension
+(`etc_engine.laws.by_dimension`) holds these constants.
+
+**States as temperatures.** The mean and the dipoles are those of d + 1 equal parts of the particle in the directions
+v_k of a simplex, thirds of a disk and quarters of a sphere,
+
+    T_k = T_o + sqrt(d/(d + 2)) D . v_k,      each of the heat capacity rho c V/(d + 1):
 
 the capacity stays diagonal, the heat is 1 . C T, and a common temperature is still one without flow.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Elements, Material, cholesky_inverse, packed_starts
+from etc_engine.engines.dtem.element import Elements, Resistances, cholesky_inverse, packed_starts
 from etc_engine.engines.dtem.methods import find_method, flux_modes
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.network import ContactNetwork
+from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.sides import ContactSides
 
-SHARE = 6.0 / 7.0
-"""Part of the rim's first harmonic that follows the dipole; the rest follows the flux at once."""
-_ANGLES = 2.0 * np.pi * np.arange(3) / 3.0
-_AROUND = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
-FROM_THIRDS = np.concatenate([np.full((1, 3), 1.0 / 3.0), np.sqrt(8.0) / 3.0 * _AROUND])
-"""(T_o, D_c, D_s) of the temperatures of the three thirds, shape (3, 3)."""
+SIMPLEX: Mapping[int, NDArray[np.float64]] = {
+    2: np.stack([np.cos(2.0 * np.pi * np.arange(3) / 3.0), np.sin(2.0 * np.pi * np.arange(3) / 3.0)]),
+    3: np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0], [1.0, -1.0, -1.0, 1.0]]) / np.sqrt(3.0),
+}
+"""Directions of the parts of a particle, shape (d, d + 1)."""
+
+
+def readings_of_parts(dimension: int) -> NDArray[np.float64]:
+    """(T_o, D) of the temperatures of the d + 1 parts of a particle, shape (d + 1, d + 1)."""
+    parts = dimension + 1
+    slope = np.sqrt(dimension * (dimension + 2.0)) / parts
+    return np.concatenate([np.full((1, parts), 1.0 / parts), slope * SIMPLEX[dimension]])
 
 
 def storing_elements(
-    sides: ContactSides, material: Material, method: str, *, dipoles: bool = False, modes: int | None = None
+    sides: ContactSides,
+    conductivity: NDArray[np.float64],
+    method: str,
+    *,
+    dipoles: bool = False,
+    modes: int | None = None,
 ) -> Elements:
-    """Elements of all disks over their contacts and their states, which are temperatures that store heat.
+    """Elements of all particles over their contacts and their states, which are temperatures that store heat.
 
     Parameters
     ----------
     sides : ContactSides
-    material : Material
+    conductivity : ndarray, shape (n,) [W/(m K)]
     method : str
         A name of `etc_engine.engines.dtem.methods.METHODS`, but for ``exact``.
     dipoles : bool
-        Three states a particle, its thirds; otherwise one, its mean.
+        d + 1 states per particle, its parts; otherwise one, its mean.
     modes : int, optional
         Flux modes of a contact, with ``arc``.
 
@@ -85,21 +107,22 @@ def storing_elements(
     -------
     Elements
         Rows of a particle: its contacts, modes fastest, then its states. Nodes: M times the contact plus the mode, and
-        after all contacts the states by particle. ``modes`` is M. ``apply`` answers the heat into the particle at
+        after all contacts the states by particle. ``modes`` is M. ``apply`` returns the heat into the particle at
         the contacts, and what the states lose.
 
     Raises
     ------
     GeometryError
-        If H' + e e^T/(8 pi kappa), or H'' with dipoles, of a disk is not positive definite.
+        If H' + e e^T/(8 pi kappa), or H'' with dipoles, of a particle is not positive definite.
     InputError
         If the method has no such form.
     """
-    variant, modes = find_method(method), flux_modes(method, modes)
+    dimension, law = sides.dimension, law_of(sides.dimension)
+    variant, modes = find_method(method, dimension), flux_modes(method, modes, dimension)
     if variant.resistances is None:
         raise InputError(f"method {method} has no transient form: choose chord, arc, standard or enhanced")
-    h = variant.resistances(sides, material, modes)
-    states = 3 if dipoles else 1
+    h = variant.resistances(sides, conductivity, modes)
+    states = dimension + 1 if dipoles else 1
     count = sides.offsets.size - 1
     contact_rows = modes * np.diff(sides.offsets)
     offsets = np.concatenate([[0], np.cumsum(contact_rows + states)])
@@ -107,12 +130,10 @@ def storing_elements(
     values = np.zeros(int(starts[-1]))
     bad = _fill(
         modes * sides.offsets,
-        h.starts,
-        h.values,
-        h.moments,
-        modes,
-        material.conductivity,
-        FROM_THIRDS if dipoles else np.ones((1, 1)),
+        h,
+        np.ascontiguousarray(conductivity * length_scales(sides.radii, dimension)),
+        (law.warming, law.harmonic, law.share),
+        readings_of_parts(dimension) if dipoles else np.ones((1, 1)),
         starts,
         values,
     )
@@ -140,52 +161,27 @@ def _indefinite(particle: int, sides: ContactSides, method: str, dipoles: bool) 
     )
 
 
-def stored_areas(network: ContactNetwork, method: str) -> NDArray[np.float64]:
-    """Area of each disk that stores heat, its volume per unit thickness, shape (n,) [m2].
-
-    V = pi R^2 - sum_i R^2 (alpha_i - sin alpha_i cos alpha_i) over the contacts that cut the disk.
-
-    Parameters
-    ----------
-    network : ContactNetwork
-    method : str
-
-    Notes
-    -----
-    Geometric contacts, walls of all kinds included, cut the disk at their chords; so do prescribed ones with ``chord``.
-    With the other methods prescribed arcs cut nothing off. Segments are taken for disjoint, as contact arcs must be.
-    """
-    radii = network.packing.radii
-    areas = np.pi * radii**2
-    if network.geometric or method == "chord":
-        owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
-        alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
-        segments = alpha - np.sin(alpha) * np.cos(alpha)
-        areas -= radii**2 * np.bincount(owner, segments, minlength=radii.size)
-    return np.asarray(areas)
-
-
 @njit(cache=True)
 def _fill(
     offsets: NDArray[np.int64],
-    h_starts: NDArray[np.int64],
-    h_values: NDArray[np.float64],
-    moments: NDArray[np.float64],
-    modes: int,
-    conductivity: NDArray[np.float64],
+    h: Resistances,
+    scales: NDArray[np.float64],
+    constants: tuple[float, float, float],
     readings: NDArray[np.float64],
     starts: NDArray[np.int64],
     values: NDArray[np.float64],
 ) -> int:
-    """Fill the packed matrices; answers the first particle without a positive definite one, or -1.
+    """Fill the packed matrices; returns the first particle without a positive definite one, or -1.
 
-    ``readings`` turns the states into (T_o) or (T_o, D_c, D_s).
+    A = (H' + warming e e^T/scale - share harmonic sum_d u_d u_d^T/scale)^-1 and G = e W_0 + share sum_d u_d W_d, joined
+    to the element of `_join`. ``scales`` are kappa R^(d-2), ``constants`` warming, harmonic and share of the law;
+    ``readings`` turns the states into (T_o) or (T_o, D).
     """
-    states = readings.shape[0]
+    warming, harmonic, share = constants
+    states, modes, moments = readings.shape[0], h.modes, h.moments
     for p in range(offsets.size - 1):
         first, n = offsets[p], offsets[p + 1] - offsets[p]
-        a = h_values[h_starts[p] : h_starts[p + 1]].copy().reshape((n, n))
-        scale = 1.0 / (np.pi * conductivity[p])
+        a = h.values[h.starts[p] : h.starts[p + 1]].copy().reshape((n, n))
         g = np.zeros((n, states))  # temperature of each row by the states alone
         for i in range(n):
             if i % modes == 0:
@@ -193,15 +189,15 @@ def _fill(
                     g[i, k] += readings[0, k]
             for d in range(1, states):
                 for k in range(states):
-                    g[i, k] += SHARE * moments[first + i, d - 1] * readings[d, k]
+                    g[i, k] += share * moments[first + i, d - 1] * readings[d, k]
             for j in range(n):
                 if i % modes == 0 and j % modes == 0:
-                    a[i, j] += (0.125 - np.log(2.0)) * scale
+                    a[i, j] += warming / scales[p]
                 for d in range(states - 1):
-                    a[i, j] -= SHARE * scale * moments[first + i, d] * moments[first + j, d]
+                    a[i, j] -= share * harmonic / scales[p] * moments[first + i, d] * moments[first + j, d]
         if not cholesky_inverse(a, n):
             return p
-        _join(a, g, readings, SHARE / scale, values[starts[p] : starts[p + 1]])
+        _join(a, g, readings, share * scales[p] / harmonic, values[starts[p] : starts[p + 1]])
     return -1
 
 

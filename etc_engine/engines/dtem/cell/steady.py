@@ -1,0 +1,176 @@
+"""Steady heat conduction through disks and the fluid between them: one walled axis, or periodic axes together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.engines.dtem.cell.assembly import CellMaterials, CellSystem, assemble_cells
+from etc_engine.engines.dtem.cell.frame import Frame
+from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution, divide
+from etc_engine.engines.dtem.cell.rim_grid import EdgeGrid
+from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
+
+Floats = NDArray[np.float64]
+
+EXACT_LEVEL = 4000
+"""Frames of at most so many unknowns are factorised; larger ones go through multigrid."""
+
+
+@dataclass(frozen=True, eq=False)
+class CellModel:
+    """Assembled cells that can be solved for any load.
+
+    Parameters
+    ----------
+    geometry : CellGeometry
+    materials : CellMaterials
+    grid : EdgeGrid
+    frame : Frame
+    system : CellSystem
+    """
+
+    geometry: CellGeometry
+    materials: CellMaterials
+    grid: EdgeGrid
+    frame: Frame
+    system: CellSystem
+
+
+@dataclass(frozen=True, eq=False)
+class CellSolution:
+    """Temperatures of the frames under one group of loads.
+
+    Parameters
+    ----------
+    model : CellModel
+    axes : tuple of int
+        Load axes, one column each: walls at temperature 1 (low end) and 0 (far end), or a mean temperature gradient
+        of 1 along a periodic axis.
+    fluctuations : ndarray, shape (n, k) [K]
+        Temperatures at the unknowns of the frames; with a mean gradient, what is left when it is taken away.
+    energies : ndarray, shape (k, k) [W/m]
+        sum_p t_pa . K_p t_pb.
+    reports : tuple of SolveReport
+        One per load.
+    """
+
+    model: CellModel
+    axes: tuple[int, ...]
+    fluctuations: Floats
+    energies: Floats
+    reports: tuple[SolveReport, ...]
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the loads are mean gradients along periodic axes."""
+        return self.model.geometry.box.periodic[self.axes[0]]
+
+    def wall_heat_flows(self) -> tuple[float, float]:
+        """Heat flow in at the low wall and out at the far wall of a walled load [W/m]."""
+        reactions = self.model.system.matrix @ self.fluctuations[:, 0]
+        low, far = (wall_unknowns(self.model, 2 * self.axes[0] + end) for end in range(2))
+        return float(reactions[low].sum()), -float(reactions[far].sum())
+
+
+def build_model(
+    geometry: CellGeometry,
+    solid: Floats,
+    fluid: float,
+    resolution: Resolution | None = None,
+    *,
+    storing: bool = False,
+) -> CellModel:
+    """Reduce and assemble the cells for one set of conductivities.
+
+    Parameters
+    ----------
+    geometry : CellGeometry
+    solid : ndarray, shape (n,) [W/(m K)]
+    fluid : float [W/(m K)]
+    resolution : Resolution, optional
+    storing : bool
+        Whether the mean temperatures of the disks are unknowns too.
+
+    Returns
+    -------
+    CellModel
+    """
+    resolution = resolution or Resolution()
+    grid, frame = divide(geometry, solid, fluid, resolution, storing=storing)
+    materials = CellMaterials(geometry.radii, np.ascontiguousarray(solid, np.float64), float(fluid))
+    system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials)
+    return CellModel(geometry, materials, grid, frame, system)
+
+
+def wall_unknowns(model: CellModel, wall: int) -> NDArray[np.int64]:
+    """Frame unknowns on a wall; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end."""
+    cells, frame = model.geometry.cells, model.frame
+    rows = np.flatnonzero(cells.cells[cells.edges, 1] == -1 - wall)
+    end = np.searchsorted(cells.starts, rows, side="right")
+    following = np.where(rows + 1 == cells.starts[end], cells.starts[end - 1], rows + 1)
+    edges = cells.edges[rows]
+    own = [np.arange(frame.first[e], frame.first[e + 1]) for e in edges]
+    return np.unique(np.concatenate((cells.vertices[rows], cells.vertices[following], *own)))
+
+
+def solve_model(model: CellModel, axes: tuple[int, ...], *, tolerance: float = 1e-10) -> CellSolution:
+    r"""Temperatures of the frames for one walled axis, or for periodic axes together.
+
+    .. math:: K u_a = -g_a
+
+    with one unknown held (periodic), or with the unknowns on the two walls of the axis at 1 and 0. Walls of other
+    axes are insulated.
+
+    Parameters
+    ----------
+    model : CellModel
+    axes : tuple of int
+        A single walled axis, or periodic axes only.
+    tolerance : float
+        Relative error of the conductivity left by the solver.
+
+    Returns
+    -------
+    CellSolution
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    system, count = model.system, model.frame.count
+    held = np.zeros(count, dtype=np.bool_)
+    fluctuations = np.zeros((count, len(axes)))
+    if model.geometry.box.periodic[axes[0]]:
+        held[0] = True
+        loads = system.loads[:, list(axes)]
+        lift = system.gradient_energy[np.ix_(axes, axes)]
+    else:
+        held[wall_unknowns(model, 2 * axes[0] + 1)] = True
+        low = wall_unknowns(model, 2 * axes[0])
+        held[low], fluctuations[low, 0] = True, 1.0
+        loads = system.matrix @ fluctuations
+        lift = fluctuations.T @ loads
+    free = np.flatnonzero(~held)
+    reports = []
+    if free.size:
+        matrix = system.matrix[free][:, free]
+        preconditioner = build_preconditioner(matrix, EXACT_LEVEL)
+        for load in range(len(axes)):
+            u, report = solve_energy(
+                matrix,
+                np.ascontiguousarray(-loads[free, load]),
+                float(lift[load, load]),
+                preconditioner=preconditioner,
+                tolerance=tolerance,
+            )
+            fluctuations[free, load] = u
+            reports.append(report)
+    lifted = fluctuations.T @ (system.matrix @ fluctuations)
+    if model.geometry.box.periodic[axes[0]]:
+        cross = fluctuations.T @ loads
+        lifted = lift + cross + cross.T + lifted
+    nothing = SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return CellSolution(model, axes, fluctuations, lifted, tuple(reports) or (nothing,) * len(axes))

@@ -1,0 +1,138 @@
+"""Steady conduction between a hot and a cold wall with properties that follow the local temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.engines.dtem.facet_elements import FacetMaterial
+from etc_engine.engines.dtem.facet_steady import FacetSolution, solve_facets
+from etc_engine.errors import ConvergenceError, InputError
+from etc_engine.medium.facets import FacetLinks
+
+Floats = NDArray[np.float64]
+MaterialAt = Callable[[Floats, Floats], FacetMaterial]
+"""Material from the temperatures [K] of the spheres, shape (n,), and of the links, shape (m + w,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearSolution:
+    """Temperatures and heat flow between two walls.
+
+    Parameters
+    ----------
+    solution : FacetSolution
+        Of the last linear problem: hot wall 1, cold wall 0.
+    temperatures : ndarray, shape (n,) [K]
+        Of the spheres.
+    heat_flow : float [W]
+        From the hot to the cold wall.
+    imbalance : float [-]
+        Difference of what enters at one wall and leaves at the other, over the heat flow.
+    conductivity : float [W/(m K)]
+        Q L/(S (T_hot - T_cold)), the mean over the temperatures between the walls.
+    iterations : int
+    change : float [K]
+        Largest change of a temperature in the last iteration.
+    """
+
+    solution: FacetSolution
+    temperatures: Floats
+    heat_flow: float
+    imbalance: float
+    conductivity: float
+    iterations: int
+    change: float
+
+
+def solve_nonlinear(
+    links: FacetLinks,
+    material_at: MaterialAt,
+    axis: int,
+    walls: tuple[float, float],
+    *,
+    tolerance: float = 1e-6,
+    most: int = 60,
+) -> NonlinearSolution:
+    r"""Picard iteration: solve with the properties of the last temperatures until these stay.
+
+    .. math:: K(T^{(n)})\, T^{(n+1)} = f, \qquad \max_p |T_p^{(n+1)} - T_p^{(n)}| < \epsilon
+
+    Parameters
+    ----------
+    links : FacetLinks
+    material_at : callable
+        Material from the temperatures of spheres and links. A link has the mean temperature of its two spheres, or of
+        its sphere and its wall.
+    axis : int
+        Normal of the two walls; not periodic.
+    walls : (float, float) [K]
+        Temperature of the wall at the low end, and at the far end.
+    tolerance : float [K]
+    most : int
+        Largest number of iterations.
+
+    Returns
+    -------
+    NonlinearSolution
+
+    Raises
+    ------
+    InputError
+        If the axis is periodic, or the walls are not two positive different temperatures.
+    ConvergenceError
+        If the temperatures still change after ``most`` iterations.
+
+    Notes
+    -----
+    Every iteration is a linear problem on the same links; the tessellation and the rings' geometry are shared. The heat
+    balance of the last one is that of the solver.
+    """
+    low, high = walls
+    if links.packing.box.periodic[axis]:
+        raise InputError(f"properties follow the temperature between two walls: axis {'xyz'[axis]} is periodic")
+    if not (low > 0.0 and high > 0.0 and np.isfinite([low, high]).all() and low != high):
+        raise InputError(f"the walls need two different absolute temperatures [K], found {low:g} and {high:g}")
+    share = links.packing.centers[:, axis] / links.packing.box.lengths[axis]
+    temperatures = low + (high - low) * np.clip(share, 0.0, 1.0)
+    change = np.inf
+    for iteration in range(1, most + 1):
+        material = material_at(temperatures, link_temperatures(links, temperatures, axis, walls))
+        solution = solve_facets(links, material, (axis,))
+        found = high + (low - high) * solution.sphere_temperatures[:, 0]
+        change = float(np.abs(found - temperatures).max())
+        temperatures = found
+        if change < tolerance:
+            return _balanced(solution, temperatures, axis, walls, (iteration, change))
+    raise ConvergenceError(
+        f"after {most} iterations a temperature still changes by {change:.3g} K, {tolerance:g} K was asked for: bring "
+        "the walls closer, or raise the number of iterations"
+    )
+
+
+def link_temperatures(links: FacetLinks, temperatures: Floats, axis: int, walls: tuple[float, float]) -> Floats:
+    """Temperature of every link, shape (m + w,) [K]: mean of both ends; undriven walls have that of their sphere."""
+    between = temperatures[links.pairs].mean(axis=1)
+    own = temperatures[links.wall_particles]
+    wall = np.where(links.walls == 2 * axis, walls[0], np.where(links.walls == 2 * axis + 1, walls[1], own))
+    return np.concatenate([between, 0.5 * (own + wall)])
+
+
+def _balanced(
+    solution: FacetSolution, temperatures: Floats, axis: int, walls: tuple[float, float], last: tuple[int, float]
+) -> NonlinearSolution:
+    enters, leaves = solution.wall_heat()
+    lengths = np.asarray(solution.links.packing.box.lengths)
+    area = float(np.prod(lengths) / lengths[axis])
+    drop = abs(walls[0] - walls[1])
+    return NonlinearSolution(
+        solution,
+        temperatures,
+        enters * drop,
+        (enters - leaves) / enters,
+        enters * float(lengths[axis]) / area,
+        *last,
+    )

@@ -1,0 +1,69 @@
+"""Filling: how the particles sit between the walls of their box; a box is not always the sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.packing.particles import ParticlePacking
+
+DEEP = 0.5
+"""A wall that cuts off more than this part of a radius goes through particles that it should hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """Where the particles are in their box.
+
+    Parameters
+    ----------
+    extent : ndarray, shape (d, 2) [m]
+        Lowest and highest surface of a particle along each axis.
+    free : ndarray, shape (2 d,) [m]
+        Distance from each wall (0 and L along x, then along y, ...) to the nearest surface, negative where the wall
+        is touched or cuts; NaN along periodic axes.
+    deep_cuts : ndarray of int, shape (2 d,)
+        Particles of which each wall cuts off more than half a radius.
+    """
+
+    extent: NDArray[np.float64]
+    free: NDArray[np.float64]
+    deep_cuts: NDArray[np.int64]
+
+    @property
+    def fill_height(self) -> float:
+        """Highest surface along the last axis, above the low face of the box [m]."""
+        return float(self.extent[-1, 1])
+
+
+def find_filling(packing: ParticlePacking) -> Filling:
+    """Where the particles of a packing are in their box.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+
+    Returns
+    -------
+    Filling
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> bed = find_filling(ParticlePacking([[0.5, 0.5], [1.5, 0.5]], [0.5, 0.5], Box((2.0, 8.0))))
+    >>> bed.free.tolist(), bed.fill_height
+    ([0.0, 0.0, 0.0, 7.0], 1.0)
+    """
+    centers, radii = packing.centers, packing.radii[:, None]
+    extent = np.stack([(centers - radii).min(axis=0), (centers + radii).max(axis=0)], axis=1)
+    lengths, periodic = np.asarray(packing.box.lengths), np.repeat(packing.box.periodic, 2)
+    free = np.stack([extent[:, 0], lengths - extent[:, 1]], axis=1).ravel()
+    cut = np.stack([radii - centers, radii - (lengths - centers)], axis=2).reshape(packing.count, -1) > DEEP * radii
+    return Filling(extent, np.where(periodic, np.nan, free), np.where(periodic, 0, cut.sum(axis=0)))
+
+
+def free_walls(packing: ParticlePacking, filling: Filling) -> NDArray[np.int64]:
+    """Walls with room for one more layer of the largest particles in front of them."""
+    return np.flatnonzero(filling.free > 2.0 * packing.radii.max())
