@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import InputError
-from etc_engine.laws import disk, sphere
+from etc_engine.laws import disk, sphere, sphere_dents
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +77,9 @@ LAWS: Mapping[int, ResistanceLaw] = {
         "sphere",
         "disk",
         sphere.SELF_RESISTANCE,
-        sphere.resistance_matrices,
+        sphere_dents.resistance_matrices,
         sphere.first_moments,
-        sphere.cap_volume,
+        sphere_dents.cap_volume,
         warming=1.0 / (20.0 * np.pi),
         harmonic=3.0 / (4.0 * np.pi),
         share=7.0 / 8.0,

@@ -19,8 +19,8 @@ def write_sphere_vtp(path: Path, field: ParticleField, modules: dict[str, Any]) 
     """Write spheres and contacts to a ``.vtp`` file.
 
     Point data ``temperature`` (NaN on the ends of lines) and ``radius`` [m]; cell data ``particle`` (-1 on lines),
-    ``mean_temperature`` and ``heat_flow`` [W] (0 on spheres; on lines from the first to the second sphere, in ParaView a
-    tube with the heat flow as its radius).
+    ``mean_temperature`` and ``heat_flow`` [W] (0 on spheres; on lines from the first to the second sphere, in ParaView
+    a tube with the heat flow as its radius).
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def temperature_range(field: ParticleField) -> tuple[float, float]:
 
 
 def slice_axes(load: int) -> tuple[int, int, int]:
-    """Axes of a slice that shows a load: across and up the picture, and normal to it (y, if the load is not along y)."""
+    """Axes of a slice that shows a load: across and up the picture, and normal to it (y unless the load is along y)."""
     normal = 1 if load != 1 else 0
     across, up = (axis for axis in range(3) if axis != normal)
     return across, up, normal
