@@ -18,7 +18,7 @@ import numpy as np
 from etc_engine.cli.sweep import launch
 from etc_engine.cli.threads import hold_one_thread
 from etc_engine.errors import EtcError
-from etc_engine.realization import Cell, Realization, RealizationSpec, Status
+from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
 
 
 def realize(
@@ -30,7 +30,7 @@ def realize(
     log: Path | None = None,
     trouble: bool = False,
 ) -> Realization:
-    """Conductivity = density * (1 + angle) * (1 + noise), one number of the stream a cell."""
+    """Conductivity = density * (1 + angle) * (1 + noise), one number of the stream per cell."""
     density = spec.packing.density or 0.8
     started = time.perf_counter()
     draw = float(rng.random())
@@ -38,8 +38,9 @@ def realize(
     if trouble and 0.5 < draw < 0.6:
         raise ZeroDivisionError(f"a draw of {draw}")
     cells = tuple(
-        tuple(_cell(density, angle, m, rng, trouble) for m in range(len(spec.conduction.methods)))
-        for angle in spec.contacts.contact_angles or (0.1,)
+        _cell(density, values.get("contact_angle", 0.1), m, rng, trouble)
+        for values in spec.combinations()
+        for m in range(spec.shape[-1])
     )
     if log is not None:
         with log.open("a") as stream:  # one short write in append mode: whole lines, also from many ranks
@@ -48,14 +49,14 @@ def realize(
     return Realization(int(1000 * density), density, density * 0.99, elapsed, cells)
 
 
-def _cell(density: float, angle: float, method: int, rng: np.random.Generator, trouble: bool) -> Cell:
+def _cell(density: float, angle: float, method: int, rng: np.random.Generator, trouble: bool) -> Outcome:
     noise, fate = rng.normal(), rng.random()
     if trouble and fate < 0.1:
-        return Cell(Status.NOT_CONVERGED, "stopped after 100 iterations")
+        return Outcome(Status.NOT_CONVERGED, "stopped after 100 iterations")
     value = 0.0 if trouble and fate < 0.2 else density * (1.0 + angle + method) * (1.0 + 0.05 * noise)
     status = Status.OK if value else Status.NOT_PERCOLATING
     conductivity = np.array([[value, np.nan], [np.nan, 1.01 * value]])
-    return Cell(status, "", conductivity, 17, 4, 3.5, 20, 6, 1e-11, 0.001)
+    return Outcome(status, "", conductivity, 17, 4, 3.5, 20, 6, 1e-11, 0.001)
 
 
 def wait(seconds: float, burn: bool) -> None:

@@ -15,29 +15,33 @@ import click
 from etc_engine.cli.particle_options import SampleWords, particle_options, read_sample
 
 if TYPE_CHECKING:
-    from etc_engine.medium.composite import Composite, Homogenized
+    from etc_engine.medium.conductivity import EffectiveConductivity
+    from etc_engine.medium.medium import Medium
     from etc_engine.particle_files.table import ParticleTable
+    from etc_engine.realization import Engine
 
-ENGINES = ("voxel", "lattice")
+LATTICE_PARTICLES = 20_000
+"""Of a lattice for one medium, about; a sweep takes fewer."""
 
 
 @click.command("homogenize")
 @click.argument("inclusions", type=click.Path(path_type=Path))
 @particle_options
-@click.option("--engine", type=click.Choice(ENGINES), default="voxel", show_default=True, help="FFT, or particles.")
+@click.option("--engine", default="voxel", show_default=True, help="voxel: FFT on voxels; lattice: particles.")
+@click.option("--method", help="Of voxel: laminate or binary, the kind of voxel; of lattice: laguerre or contact.")
 @click.option("--matrix", type=float, required=True, help="Conductivity of the matrix [W/(m K)].")
 @click.option(
-    "--inclusion", type=float, help="Conductivity of the inclusions [W/(m K)]; the file's column goes before."
+    "--inclusion", type=float, help="Conductivity of the inclusions [W/(m K)]; a column of the file is used instead."
 )
 @click.option(
     "--boundary",
     type=click.Choice(("periodic", "walls")),
-    help="periodic (default of CSV), or walls: two isothermal faces, the others adiabatic. Default else: as the box.",
+    help="periodic (default of CSV), or walls: two isothermal faces, the others adiabatic. By default as the box.",
 )
 @click.option("--resolution", type=int, help="voxel: voxels along the shortest edge; 64 by default.")
-@click.option("--solver", type=click.Choice(("cg", "eyre-milton")), help="voxel: iteration; cg by default.")
-@click.option("--green", type=click.Choice(("rotated", "continuous")), help="voxel: Green operator; default rotated.")
-@click.option("--voxels", type=click.Choice(("laminate", "binary")), help="voxel: at interfaces; default laminate.")
+@click.option("--solver", help="voxel: iteration; cg by default.")
+@click.option("--green", help="voxel: Green operator; default rotated.")
+@click.option("--voxels", hidden=True)
 @click.option("--particles", type=int, help="lattice: number of particles, about; 20000 by default.")
 @click.option("--seed", type=int, help="lattice: seed of its particles; 1 by default.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with inclusions and result.")
@@ -50,19 +54,10 @@ ENGINES = ("voxel", "lattice")
 def homogenize_command(
     inclusions: Path,
     words: SampleWords,
-    engine: str,
-    matrix: float,
-    inclusion: float | None,
-    boundary: str | None,
-    resolution: int | None,
-    solver: str | None,
-    green: str | None,
-    voxels: str | None,
-    particles: int | None,
-    seed: int | None,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
+    **given: Any,
 ) -> None:
     """Effective conductivity tensor of disks or spheres in a matrix.
 
@@ -75,18 +70,16 @@ def homogenize_command(
 
     from etc_engine.cli.options import check_picture, check_place, print_json
     from etc_engine.errors import InputError
-    from etc_engine.medium.composite import Composite
+    from etc_engine.realization import effective_conductivity, find_engine
 
-    fft = {"resolution": resolution, "solver": solver, "green": green, "voxels": voxels, "plot": plot}
-    lattice = {"particles": particles, "seed": seed}
-    for name, value in (lattice if engine == "voxel" else fft).items():
-        if value is not None:
-            raise InputError(f"--{name} does not go with --engine {engine}")
     if plot is not None:
         check_picture(plot)
     for path in (output, plot):
         if path is not None:
             check_place(path, inclusions)
+    boundary, engine = given["boundary"], find_engine(given.pop("engine"))
+    if engine.needs_contacts:
+        raise InputError(f"engine {engine.name} works on contacts: use the command solve")
     table = read_sample(inclusions, words, unknown_periodic=boundary != "walls")
     if table.wrapped:
         moved = (
@@ -95,28 +88,20 @@ def homogenize_command(
             else (f"{table.wrapped} centres lay outside the box and were")
         )
         click.echo(f"etc-engine: note: {moved} wrapped into it", err=True)
-    given = inclusion if table.conductivity is None else table.conductivity
-    if inclusion is not None and table.conductivity is not None:
-        click.echo(f"etc-engine: note: --inclusion is not used: {inclusions} has a column 'conductivity'", err=True)
-    if given is None:
-        raise InputError("the conductivity of the inclusions is missing: give --inclusion, or a column 'conductivity'")
-    composite = Composite(table.packing, matrix, np.asarray(given))
-    if plot is not None and np.isinf(composite.inclusion).any():
+    medium = _medium(table, inclusions, given.pop("matrix"), given.pop("inclusion"))
+    _warn_of_overlaps(medium)
+    boundary = boundary or ("periodic" if all(medium.box.periodic) else "walls")
+    method, seed, options = _choices(engine, medium, given | {"boundary": boundary})
+    if plot is not None and engine.section is None:
+        raise InputError(f"--plot is not valid with --engine {engine.name}: it has no picture")
+    if plot is not None and not np.isfinite(medium.conductivity).all():
         raise InputError("--plot needs finite conductivities: leave it out, or give the inclusions a large one")
-    _warn_of_overlaps(composite)
-    boundary = boundary or ("periodic" if all(table.packing.box.periodic) else "walls")
-    if engine == "voxel":
-        options = {name: value for name, value in fft.items() if value is not None and name != "plot"}
-        result = _by_voxels(composite, boundary, options)
-    else:
-        result = _by_lattice(
-            composite, boundary, 20_000 if particles is None else particles, 1 if seed is None else seed
-        )
-    record = _record(composite, engine, boundary, result)
+    result = effective_conductivity(medium, engine=engine.name, method=method, tolerance=1e-8, seed=seed, **options)
+    record = _record(medium, engine.name, method, boundary, result)
     with ExitStack() as files:
-        _write(files, output, table, composite, record)
+        _write(files, output, table, medium, record)
         if plot is not None:
-            _draw(files, plot, composite, boundary, record, options)
+            _draw(files, plot, engine.section, (medium, method, options), record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
         print_json(record)
@@ -124,20 +109,58 @@ def homogenize_command(
         _print_table(record)
 
 
-def _warn_of_overlaps(composite: Composite) -> None:
-    count = composite.overlapping
+def _medium(table: ParticleTable, path: Path, matrix: float, inclusion: float | None) -> Medium:
+    """The particles of a file, and the matrix as their pores."""
+    import numpy as np
+
+    from etc_engine.errors import InputError
+    from etc_engine.medium.medium import Medium, Pores
+    from etc_engine.medium.phases import check_phases
+
+    given = inclusion if table.conductivity is None else table.conductivity
+    if inclusion is not None and table.conductivity is not None:
+        click.echo(f"etc-engine: note: --inclusion is not used: {path} has a column 'conductivity'", err=True)
+    if given is None:
+        raise InputError("the conductivity of the inclusions is missing: give --inclusion, or a column 'conductivity'")
+    medium = Medium(table.packing, np.asarray(given), pores=Pores(matrix))
+    check_phases(medium)
+    return medium
+
+
+def _choices(engine: Engine, medium: Medium, given: dict[str, Any]) -> tuple[str, int, dict[str, Any]]:
+    """Method, seed and options of the engine out of the options that are given."""
+    from etc_engine.errors import InputError
+
+    voxels, method, seed = given.pop("voxels"), given.pop("method"), given.pop("seed")
+    if voxels is not None:
+        raise InputError(f"--voxels {voxels} is now --method {voxels}")
+    method = method or engine.default_method(medium.dimension, medium.pores.conduct)
+    heeded = engine.find_method(method).options
+    for name, value in given.items():
+        if value is not None and name not in heeded:
+            raise InputError(f"--{name} is not valid with --engine {engine.name}")
+    options = {name: value for name, value in given.items() if value is not None}
+    if "particles" in heeded:
+        options.setdefault("particles", LATTICE_PARTICLES)
+    elif seed is not None:
+        raise InputError(f"--seed is not valid with --engine {engine.name}")
+    if "threads" in heeded:
+        options["threads"] = _threads()
+    if seed is not None and seed < 0:
+        raise InputError(f"a seed is a whole number of at least 0, found {seed}")
+    return method, 1 if seed is None else seed, options
+
+
+def _warn_of_overlaps(medium: Medium) -> None:
+    from etc_engine.medium.phases import count_overlaps
+
+    count = count_overlaps(medium.packing)
     if count == 0:
         return
     who = "1 pair of inclusions overlaps: its" if count == 1 else f"{count} pairs of inclusions overlap: their"
     divided = ", divided by the radical plane where their conductivities differ"
-    differ = bool((composite.inclusion != composite.inclusion[0]).any())
+    differ = bool((medium.conductivity != medium.conductivity[0]).any())
     click.echo(f"etc-engine: warning: {who} union counts once{divided if differ else ''}", err=True)
-
-
-def _by_voxels(composite: Composite, boundary: str, options: dict[str, Any]) -> Homogenized:
-    from etc_engine.engines.voxel import homogenize_voxel
-
-    return homogenize_voxel(composite, boundary=boundary, threads=_threads(), **options)
 
 
 def _threads() -> int:
@@ -146,44 +169,34 @@ def _threads() -> int:
     return int(word) if word.isdigit() and int(word) > 0 else 1
 
 
-def _by_lattice(composite: Composite, boundary: str, particles: int, seed: int) -> Homogenized:
-    import numpy as np
-
-    from etc_engine.engines.lattice.homogenize import homogenize_lattice
-    from etc_engine.errors import InputError
-
-    if composite.dimension == 2:
-        raise InputError("the lattice is made of spheres, the inclusions are disks: use --engine voxel")
-    if seed < 0:
-        raise InputError(f"a seed is a whole number of at least 0, found {seed}")
-    return homogenize_lattice(composite, particles=particles, boundary=boundary, rng=np.random.default_rng(seed))
-
-
-def _record(composite: Composite, engine: str, boundary: str, result: Homogenized) -> dict[str, Any]:
+def _record(
+    medium: Medium, engine: str, method: str, boundary: str, result: EffectiveConductivity[Any]
+) -> dict[str, Any]:
+    from etc_engine.medium.phases import count_overlaps
     from etc_engine.models.bounds import parallel, series
 
+    kappa, pores = medium.conductivity, medium.pores.conductivity
     record: dict[str, Any] = {
         "engine": engine,
+        "method": method,
         "boundary": boundary,
-        "dimension": composite.dimension,
-        "inclusions": composite.inclusions.count,
-        "overlaps": composite.overlapping,
+        "dimension": medium.dimension,
+        "inclusions": medium.packing.count,
+        "overlaps": count_overlaps(medium.packing),
         "conductivity_tensor": result.tensor,
-        "volume_fraction": result.volume_fraction,
+        "volume_fraction": result.solid_fraction,
     }
-    if float(composite.inclusion.min()) == float(composite.inclusion.max()):
-        phases = composite.matrix, float(composite.inclusion[0]), composite.volume_fraction
+    if float(kappa.min()) == float(kappa.max()):
+        phases = pores, float(kappa[0]), medium.solid_fraction
         record["conductivity_bounds"] = [float(series(*phases)), float(parallel(*phases))]
     return record | {
         "unknowns": result.unknowns,
         "iterations": result.iterations,
-        "relative_error_estimate": result.relative_error_estimate,
+        "relative_error_estimate": result.model_error,
     }
 
 
-def _write(
-    files: ExitStack, path: Path | None, table: ParticleTable, composite: Composite, record: dict[str, Any]
-) -> None:
+def _write(files: ExitStack, path: Path | None, table: ParticleTable, medium: Medium, record: dict[str, Any]) -> None:
     """The inclusions with their conductivities, and the tensor, as netCDF."""
     if path is None:
         return
@@ -194,13 +207,13 @@ def _write(
 
     attributes = {key: value for key, value in record.items() if key != "conductivity_tensor"}
     attributes |= {
-        "title": f"effective conductivity of {composite.inclusions.count} inclusions in a matrix",
-        "matrix_conductivity": composite.matrix,
+        "title": f"effective conductivity of {medium.packing.count} inclusions in a matrix",
+        "matrix_conductivity": medium.pores.conductivity,
         "source": f"etc_engine {engine_version()}",
         "command": " ".join(["etc-engine", *sys.argv[1:]]),
     }
-    dataset = packing_dataset(replace(table, conductivity=composite.inclusion), attributes)
-    axes = list(AXES[: composite.dimension])
+    dataset = packing_dataset(replace(table, conductivity=medium.conductivity), attributes)
+    axes = list(AXES[: medium.dimension])
     dataset["effective_conductivity"] = (
         ("direction_i", "direction_j"),
         record["conductivity_tensor"],
@@ -211,16 +224,14 @@ def _write(
 
 
 def _draw(
-    files: ExitStack, path: Path, composite: Composite, boundary: str, record: dict[str, Any], options: dict[str, Any]
+    files: ExitStack, path: Path, section: Any, task: tuple[Medium, str, dict[str, Any]], record: dict[str, Any]
 ) -> None:
     """A section, from one more solve that keeps the field."""
     from etc_engine.durable.files import replacing
-    from etc_engine.engines.voxel.section import solve_section
     from etc_engine.output.figures.voxel import save_section
 
-    section = solve_section(composite, boundary=boundary, threads=_threads(), **options)
     caption = f"k$_{{xx}}$ = {record['conductivity_tensor'][0, 0]:.6g} W/(m K), f = {record['volume_fraction']:.4f}"
-    save_section(section, files.enter_context(replacing(path)), caption)
+    save_section(section(*task), files.enter_context(replacing(path)), caption)
 
 
 def _print_table(record: dict[str, Any]) -> None:

@@ -1,15 +1,24 @@
-"""``etc-engine info``: where a result file comes from and what is in it."""
+"""``etc-engine info``: where a file comes from and what is in it."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.errors import InputError, OutputError
+
 if TYPE_CHECKING:
     import xarray
+
+NETCDF = (b"\x89HDF", b"CDF")
+WIDTH = 13
+LONG = ("study", "study_resolved", "study_file", "versions", "runs")
+"""Attributes that are printed as tables, or with --study."""
 
 
 @click.command("info")
@@ -17,24 +26,105 @@ if TYPE_CHECKING:
 @click.option("--study", is_flag=True, help="Print the study file the result was made from, and nothing else.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def info_command(file: Path, study: bool, as_json: bool) -> None:
-    """Print the provenance of FILE: study, seed, versions, commit, command, hosts, times, and how cells ended.
+    """Print what FILE holds and where it comes from: a sweep, a transient, a single solve, a packing, a dump.
 
+    Of results: study, seed, versions, commit, command, hosts, times, and how cells ended.
     `etc-engine info FILE.nc --study > again.toml` gives the study back, ready to be run again.
     """
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.cli.options import print_json
 
-    dataset = open_dataset(file)
+    dataset = _load(file)
     if study:
-        click.echo(dataset.attrs["study"], nl=False)
-    elif as_json:
-        click.echo(json.dumps(describe(dataset)))
+        text = "" if dataset is None else dataset.attrs.get("study", dataset.attrs.get("study_file", ""))
+        if not text:
+            raise InputError(f"{file} was made without a study file")
+        click.echo(text, nl=False)
+        return
+    found = describe_particles(file) if dataset is None else describe(dataset, str(file))
+    if as_json:
+        print_json(found)
     else:
-        for line in _lines(describe(dataset)):
+        for line in _lines(found):
             click.echo(line)
 
 
-def describe(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Provenance and content of a sweep's dataset, as plain values."""
+def describe(dataset: xarray.Dataset, place: str = "the file") -> dict[str, Any]:
+    """Provenance and content of a dataset that the engine wrote, as plain values.
+
+    Raises
+    ------
+    OutputError
+        If it is none of the engine's.
+    """
+    for kind in KINDS:
+        if kind.recognises(dataset):
+            return {"kind": kind.name} | kind.describe(dataset)
+    raise OutputError(f"{place} is not the result of a command of this engine: it is none of {_known()}")
+
+
+def describe_particles(path: Path) -> dict[str, Any]:
+    """What a particle file of any format holds.
+
+    Raises
+    ------
+    InputError, OutputError
+    """
+    from etc_engine.particle_files.formats import count_frames, format_to_read
+
+    if not path.exists():
+        raise OutputError(f"cannot read {path}: there is no file of that name")
+    kind = format_to_read(path)
+    return {"kind": f"particles ({kind.name})", "frames": count_frames(path)} | _particles(path)
+
+
+def _particles(path: Path) -> dict[str, Any]:
+    from etc_engine.box import AXES
+    from etc_engine.particle_files.formats import read_rows
+
+    rows = read_rows(path)
+    low, high = rows.positions.min(axis=0), rows.positions.max(axis=0)
+    found: dict[str, Any] = {
+        "particles": len(rows.radii),
+        "radii": [float(rows.radii.min()), float(rows.radii.max())],
+        "centres": {AXES[k]: [float(low[k]), float(high[k])] for k in range(low.size)},
+    }
+    if rows.bounds is not None:
+        found["box"] = {AXES[k]: face for k, face in enumerate(rows.bounds.tolist())}
+        found["periodic"] = "".join(axis for axis, flag in zip(AXES, rows.periodic or (), strict=False) if flag)
+    given = {name: getattr(rows, name) for name in ("ids", "types", "conductivity", "temperature")}
+    found["columns"] = [name for name, values in given.items() if values is not None]
+    if rows.types is not None:
+        found["types"] = sorted(set(rows.types.tolist()))
+    if rows.printed is not None:
+        found["significant_digits"] = max(column.digits.significant for column in rows.printed.positions)
+    return found
+
+
+def _load(path: Path) -> xarray.Dataset | None:
+    """The dataset of a netCDF file; None if it is something else."""
+    try:
+        with path.open("rb") as file:
+            opening = file.read(4)
+    except FileNotFoundError:
+        raise OutputError(f"cannot read {path}: there is no file of that name") from None
+    except OSError as error:
+        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
+    if not opening.startswith(NETCDF):
+        if path.suffix == ".nc":
+            raise OutputError(f"cannot read {path}: it is damaged or no netCDF file")
+        return None
+    import xarray
+
+    try:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
+            return stored.load()
+    except OSError as error:
+        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
+    except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
+        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
+
+
+def _sweep(dataset: xarray.Dataset) -> dict[str, Any]:
     from etc_engine.realization import Status
 
     attributes, status = dataset.attrs, dataset["status"].values
@@ -51,7 +141,7 @@ def describe(dataset: xarray.Dataset) -> dict[str, Any]:
         "versions": json.loads(attributes["versions"]),
         "study": json.loads(attributes["study_resolved"]),
         "study_digest": attributes["study_digest"],
-        "dimensions": {str(name): size for name, size in dataset.sizes.items()},
+        "dimensions": _sizes(dataset),
         "units": int((dataset["worker_rank"] >= 0).sum()),
         "cells": {s.name.lower(): int((status == s).sum()) for s in Status if (status == s).any()},
         "pack_seconds": float(dataset["pack_seconds"].sum()),
@@ -59,16 +149,79 @@ def describe(dataset: xarray.Dataset) -> dict[str, Any]:
     }
 
 
+def _transient(dataset: xarray.Dataset) -> dict[str, Any]:
+    times = dataset["time"].values
+    found = _plain(dataset.attrs)
+    found["times"] = [float(times[0]), float(times[-1])] if times.size else []
+    return found | _tables(dataset) | {"dimensions": _sizes(dataset), "variables": list(map(str, dataset.data_vars))}
+
+
+def _general(dataset: xarray.Dataset) -> dict[str, Any]:
+    variables = list(map(str, dataset.data_vars))
+    return _plain(dataset.attrs) | _tables(dataset) | {"dimensions": _sizes(dataset), "variables": variables}
+
+
+def _tables(dataset: xarray.Dataset) -> dict[str, Any]:
+    """Attributes that hold JSON."""
+    found = {}
+    for name, key in (("versions", "versions"), ("study_resolved", "study")):
+        if name in dataset.attrs:
+            found[key] = json.loads(dataset.attrs[name])
+    return found
+
+
+def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in attributes.items() if name not in LONG}
+
+
+def _sizes(dataset: xarray.Dataset) -> dict[str, int]:
+    return {str(name): size for name, size in dataset.sizes.items()}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file that the engine writes: how it is recognised, and what is said of it."""
+
+    name: str
+    recognises: Callable[[xarray.Dataset], bool]
+    describe: Callable[[xarray.Dataset], dict[str, Any]]
+
+
+KINDS = (
+    Kind("sweep", lambda data: "study_digest" in data.attrs and "worker_rank" in data, _sweep),
+    Kind("transient of a network", lambda data: "study_digest" in data.attrs and "time" in data.dims, _transient),
+    Kind("transient without mesh", lambda data: "study_file" in data.attrs and "time" in data.dims, _transient),
+    Kind("homogenization", lambda data: "effective_conductivity" in data, _general),
+    Kind("single solve", lambda data: "conductivity" in data.attrs and "particle" in data.dims, _general),
+    Kind("packing", lambda data: {"box", "periodic"} <= set(data.attrs) and "radius" in data, _general),
+)
+
+
+def _known() -> str:
+    return ", ".join(kind.name for kind in KINDS)
+
+
 def _lines(found: dict[str, Any]) -> list[str]:
-    plain = ("name", "seed", "source", "commit", "command", "hosts", "started", "ended", "study_digest", "units")
-    lines = [f"{key:13} {found[key]}" for key in plain]
-    for key in ("dimensions", "cells", "versions"):
-        lines.append(f"{key:13} " + ", ".join(f"{name} {value}" for name, value in found[key].items()))
-    lines.append(f"{'computing':13} packing {found['pack_seconds']:.3g} s, solving {found['solve_seconds']:.3g} s")
-    for run in found["runs"]:
+    lines = []
+    for key, value in found.items():
+        if key in ("runs", "study", "pack_seconds", "solve_seconds"):
+            continue
+        if isinstance(value, dict):
+            text = ", ".join(f"{name} {item}" for name, item in value.items())
+        elif isinstance(value, (list, tuple)):
+            text = ", ".join(map(str, value))
+        else:
+            text = str(value)
+        lines.append(f"{key:{WIDTH}} {text}")
+    if "pack_seconds" in found:
+        lines.append(
+            f"{'computing':{WIDTH}} packing {found['pack_seconds']:.3g} s, solving {found['solve_seconds']:.3g} s"
+        )
+    for run in found.get("runs", ()):
         job = f", {run['job']}" if run["job"] else ""
-        lines.append(f"{'run':13} {run['started']} on {run['host']}, {run['ranks']} ranks{job}: {run['command']}")
-    for table, values in found["study"].items():
+        lines.append(f"{'run':{WIDTH}} {run['started']} on {run['host']}, {run['ranks']} ranks{job}: {run['command']}")
+    for table, values in found.get("study", {}).items():
         rows = values if isinstance(values, dict) else {"": values}
-        lines += [f"{'study':13} {table}{'.' * bool(key)}{key} = {json.dumps(value)}" for key, value in rows.items()]
+        for key, value in rows.items():
+            lines.append(f"{'study':{WIDTH}} {table}{'.' * bool(key)}{key} = {json.dumps(value)}")
     return lines

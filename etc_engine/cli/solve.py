@@ -7,7 +7,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,16 +21,12 @@ from etc_engine.cli.particle_options import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from etc_engine.engines.dtem.field import ParticleField
-    from etc_engine.engines.dtem.steady import SteadySolution
-    from etc_engine.engines.pipe.steady import PipeSolution
     from etc_engine.medium.conductivity import EffectiveConductivity
+    from etc_engine.medium.field import ParticleField
+    from etc_engine.medium.medium import Medium
     from etc_engine.medium.network import ContactNetwork
-
-    Result = EffectiveConductivity[SteadySolution] | EffectiveConductivity[PipeSolution]
-
+    from etc_engine.particle_files.table import ParticleTable
+    from etc_engine.realization import Engine
 
 BOND_GAP = 1e-6
 
@@ -38,8 +34,10 @@ BOND_GAP = 1e-6
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
 @particle_options
-@click.option("--method", default="chord", show_default=True, help="chord, standard, enhanced, arc, exact or pipe.")
-@click.option("--pipe-resistance", help="Resistance of a pipe, with --method pipe: chord (the default) or uniform.")
+@click.option("--axis", help="Load axis: x (the default), y, z or all.")
+@click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
+@click.option("--method", help="Of dtem: chord, standard, enhanced, arc or exact; of pipe: chord or uniform.")
+@click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
@@ -49,11 +47,18 @@ BOND_GAP = 1e-6
     "--conductivity", type=float, help="Conductivity of the particles [W/(m K)]; 1 by default, or the file's column."
 )
 @click.option(
+    "--pore-conductivity",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Conductivity of what fills the pores [W/(m K)].",
+)
+@click.option(
     "--contact-resistance",
     type=float,
     default=0.0,
     show_default=True,
-    help="Resistance of every contact, walls included, per unit thickness [m K/W].",
+    help="Resistance of every contact, walls included, in 2D per unit thickness [K/W, m K/W].",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with particles, contacts and fields.")
 @click.option("--vtk", type=click.Path(path_type=Path), help="VTK PolyData (.vtp) for ParaView.")
@@ -62,64 +67,43 @@ BOND_GAP = 1e-6
 def solve_command(
     particles: Path,
     words: SampleWords,
-    method: str,
-    pipe_resistance: str | None,
-    modes: int | None,
-    contact_angle: float | None,
-    bond_gap: float,
-    conductivity: float | None,
-    contact_resistance: float,
     output: Path | None,
     vtk: Path | None,
     plot: Path | None,
-    as_json: bool,
+    **given: Any,
 ) -> None:
-    """Effective conductivity of the disks in a file.
+    """Effective conductivity of the particles in a file.
 
-    PARTICLES is a CSV file with the columns x,y,radius[,conductivity], a LAMMPS/LIGGGHTS text dump, a netCDF (.nc)
+    PARTICLES is a CSV file with the columns x,y[,z],radius[,conductivity], a LAMMPS/LIGGGHTS text dump, a netCDF (.nc)
     or VTK (.vtp) file as ``pack`` writes it, or a file of another DEM code (VTK, extended XYZ, YADE, MercuryDPM); -
-    is standard input. Walls at x = 0 (temperature 1) and x = L (temperature 0), unless the box is periodic along x.
+    is standard input. Along the load axis the walls are held at 1 (low end) and 0 (far end), unless the box is
+    periodic along it.
     """
     start = time.perf_counter()
-    from math import radians
-
     from etc_engine.cli.options import print_json
-    from etc_engine.errors import InputError
-    from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+    from etc_engine.realization import field_along, find_engine
 
+    as_json = given.pop("as_json")
+    asked = _Asked(**given)
+    asked.refuse_old_words()
+    engine = find_engine(asked.engine)
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
-    if method != "pipe" and pipe_resistance is not None:
-        raise InputError(f"--pipe-resistance goes with --method pipe, found --method {method}")
-    if method == "pipe" and modes is not None:
-        raise InputError("--modes goes with --method exact or arc: a pipe has one heat flow")
-    if contact_angle is None and bond_gap != BOND_GAP:
-        raise InputError("--bond-gap goes with --contact-angle, which is missing: overlaps have no gap")
     table = read_sample(particles, words)
-    if conductivity is not None and table.conductivity is not None:
-        raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
-    given = 1.0 if conductivity is None else conductivity
-    if contact_angle is None:
-        network = overlap_contacts(table.packing)
-    else:
-        network = bonded_contacts(table.packing, radians(contact_angle), bond_gap)
-    asked = _Asked(
-        table.packing.box.periodic,
-        method,
-        pipe_resistance or "chord",
-        modes,
-        given if table.conductivity is None else table.conductivity,
-        contact_resistance,
-    )
-    result, field = asked.solve(network)
-    record = _record(network, asked, result, field)
-    _warn_of_close_arcs(method, result.solutions[0])
-    _warn_of_missing_contacts(network, contact_angle, bond_gap)
-    gap = 0.0 if contact_angle is None else bond_gap
-    warn_of_digits(table, gap, bonded=contact_angle is not None)
-    warn_of_sample(table, [] if table.packing.box.periodic[0] else [0], gap)
-    warn_of_excess(result.tensor, asked.conductivity)
-    _write(outputs, result, field, record)
+    medium = asked.medium(table, particles)
+    axes = _load_axes(asked.axis, medium)
+    method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
+    result = asked.solve(medium, engine, method, axes)
+    field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
+    record = _record(asked, method, result, field, axes)
+    for remark in engine.remarks(method, result):
+        click.echo(f"etc-engine: warning: {remark}", err=True)
+    _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
+    gap = 0.0 if asked.contact_angle is None else asked.bond_gap
+    warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
+    warn_of_sample(table, [axis for axis in axes if not medium.box.periodic[axis]], gap)
+    warn_of_excess(result.tensor, medium.conductivity)
+    _write(outputs, field, record)
     record["seconds"] = time.perf_counter() - start
     if as_json:
         print_json(record)
@@ -129,42 +113,73 @@ def solve_command(
 
 @dataclass(frozen=True)
 class _Asked:
-    """The physics asked for."""
+    """The physics asked for, in the words of the options."""
 
-    periodic: tuple[bool, ...]
-    method: str
-    pipe_resistance: str
+    axis: str | None
+    engine: str
+    method: str | None
+    pipe_resistance: str | None
     modes: int | None
-    conductivity: ArrayLike
+    contact_angle: float | None
+    bond_gap: float
+    conductivity: float | None
+    pore_conductivity: float
     contact_resistance: float
 
-    def solve(self, network: ContactNetwork) -> tuple[Result, ParticleField]:
-        """Conductivity, and the field of the load along x."""
-        axes = (0, 1) if all(self.periodic) else (0,)
-        if self.method == "pipe":
-            from etc_engine.engines.pipe.field import pipe_field
-            from etc_engine.engines.pipe.steady import pipe_conductivity
+    def refuse_old_words(self) -> None:
+        """Refuse spellings of earlier versions, and options that mean nothing together."""
+        from etc_engine.errors import InputError
 
-            pipes = pipe_conductivity(
-                network,
-                resistance=self.pipe_resistance,
-                conductivity=self.conductivity,
-                contact_resistance=self.contact_resistance,
-                axes=axes,
-            )
-            return pipes, pipe_field(pipes.solutions[0])
-        from etc_engine.engines.dtem.effective import effective_conductivity
-        from etc_engine.engines.dtem.field import recover_field
+        if self.method == "pipe" or self.pipe_resistance is not None:
+            found = "--method pipe" if self.method == "pipe" else f"--pipe-resistance {self.pipe_resistance}"
+            raise InputError(f"{found} is now --engine pipe --method {self.pipe_resistance or 'chord'}")
+        if self.contact_angle is None and self.bond_gap != BOND_GAP:
+            raise InputError("--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap")
 
-        elements = effective_conductivity(
-            network,
-            method=self.method,
-            conductivity=self.conductivity,
-            contact_resistance=self.contact_resistance,
-            modes=self.modes,
-            axes=axes,
-        )
-        return elements, recover_field(elements.solutions[0])
+    def medium(self, table: ParticleTable, particles: Path) -> Medium:
+        """The particles of a file with contacts and materials."""
+        from math import radians
+
+        import numpy as np
+
+        from etc_engine.errors import InputError
+        from etc_engine.medium.medium import Medium, Pores
+        from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+
+        if self.conductivity is not None and table.conductivity is not None:
+            raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
+        given = 1.0 if self.conductivity is None else self.conductivity
+        if self.contact_angle is None:
+            network = overlap_contacts(table.packing)
+        else:
+            network = bonded_contacts(table.packing, radians(self.contact_angle), self.bond_gap)
+        network = network.with_resistance(self.contact_resistance)
+        kappa = np.asarray(given if table.conductivity is None else table.conductivity)
+        return Medium(table.packing, kappa, network, Pores(self.pore_conductivity))
+
+    def solve(self, medium: Medium, engine: Engine, method: str, axes: tuple[int, ...]) -> EffectiveConductivity[Any]:
+        """The conductivity along the axes."""
+        from etc_engine.errors import InputError
+        from etc_engine.realization import effective_conductivity
+
+        if not engine.needs_contacts:
+            raise InputError(f"engine {engine.name} resolves the pores: use the command homogenize")
+        options = {} if self.modes is None else {"modes": self.modes}
+        return effective_conductivity(medium, engine=engine.name, method=method, axes=axes, **options)
+
+
+def _load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:
+    """Axes of a word; without one x, and the other axes too that come at no price in a periodic box."""
+    from etc_engine.box import AXES
+    from etc_engine.errors import InputError
+
+    box = medium.box
+    if word == "all" or (word is None and all(box.periodic)):
+        return tuple(range(box.dimension))
+    word = word or "x"
+    if word not in AXES[: box.dimension]:
+        raise InputError(f"--axis is one of {', '.join(AXES[: box.dimension])} or all, found {word!r}")
+    return (AXES.index(word),)
 
 
 @dataclass(frozen=True)
@@ -189,22 +204,17 @@ class _Outputs:
                 check_place(path, particles)
 
 
-def _write(
-    outputs: _Outputs,
-    result: Result,
-    field: ParticleField,
-    record: dict[str, Any],
-) -> None:
+def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any]) -> None:
     """Write what was asked for: every file whole, or none of them."""
     from etc_engine.durable.files import replacing
 
-    solution = result.solutions[0]
     with ExitStack() as files:
         if outputs.netcdf is not None:
             from etc_engine.durable.provenance import engine_version
             from etc_engine.output.single import solve_dataset
 
             plain = {key: value for key, value in record.items() if key != "contact_temperatures"}
+            plain |= {f"conductivity_{axis}": k for axis, k in plain.pop("conductivity_per_axis").items()}
             plain["percolates"] = int(plain["percolates"])
             plain["conductivity_units"] = "W m-1 K-1"
             plain["source"] = f"etc_engine {engine_version()}"
@@ -212,34 +222,20 @@ def _write(
                 plain["conductivity_tensor"] = plain["conductivity_tensor"].ravel()
             plain["command"] = " ".join(["etc-engine", *sys.argv[1:]])
             file = files.enter_context(replacing(outputs.netcdf))
-            solve_dataset(solution, field, plain).to_netcdf(file, engine="netcdf4")
+            solve_dataset(field, plain).to_netcdf(file, engine="netcdf4")
         if outputs.vtk is not None:
             from etc_engine.output.vtk import write_vtp
 
-            write_vtp(files.enter_context(replacing(outputs.vtk)), solution, field)
+            write_vtp(files.enter_context(replacing(outputs.vtk)), field)
         if outputs.plot is not None:
             from etc_engine.output.figures import save_field
 
-            caption = f"{record['method']}: k = {record['conductivity']:.6g} W/(m K), {record['particles']} particles"
+            name = f"{record['engine']}, {record['method']}"
+            caption = f"{name}: k = {record['conductivity']:.6g} W/(m K), {record['particles']} particles"
             if "conductivity_bounds" in record:
                 low, high = record["conductivity_bounds"]
                 caption += f", bounds {low:.8g} to {high:.8g}"
-            save_field(files.enter_context(replacing(outputs.plot)), solution, field, caption)
-
-
-def _warn_of_close_arcs(method: str, solution: SteadySolution | PipeSolution) -> None:
-    from etc_engine.engines.pipe.steady import PipeSolution
-    from etc_engine.medium.sides import count_close_arcs
-
-    if method == "exact" or isinstance(solution, PipeSolution):
-        return
-    close = count_close_arcs(solution.sides)
-    if close:
-        click.echo(
-            f"etc-engine: warning: between {close} pairs of contact arcs of one particle the gap is less than the sum "
-            f"of their half-angles; {method} loses accuracy there, method exact does not",
-            err=True,
-        )
+            save_field(files.enter_context(replacing(outputs.plot)), field, caption)
 
 
 def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | None, bond_gap: float) -> None:
@@ -263,36 +259,34 @@ def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | No
 
 
 def _record(
-    network: ContactNetwork,
-    asked: _Asked,
-    result: Result,
-    field: ParticleField,
+    asked: _Asked, method: str, result: EffectiveConductivity[Any], field: ParticleField, axes: tuple[int, ...]
 ) -> dict[str, Any]:
-    from etc_engine.engines.dtem.effective import conductivity_bounds
-    from etc_engine.engines.dtem.model_error import chord_error_estimate
-    from etc_engine.engines.pipe.steady import PipeSolution
-    from etc_engine.realization import Status
-    from etc_engine.structure.filling import find_filling
+    import numpy as np
 
-    percolates = bool(result.spans[0])
-    record: dict[str, Any] = {"method": asked.method, "conductivity": float(result.tensor[0, 0])}
-    if all(network.packing.box.periodic):
+    from etc_engine.box import AXES
+    from etc_engine.realization import Status
+
+    medium, network, axis = field.medium, field.medium.links, axes[0]
+    percolates = bool(result.spans[axis])
+    record: dict[str, Any] = {
+        "engine": asked.engine,
+        "method": method,
+        "conductivity": float(result.tensor[axis, axis]),
+        "conductivity_per_axis": {AXES[a]: float(result.tensor[a, a]) for a in axes},
+    }
+    if all(medium.box.periodic):
         record["conductivity_tensor"] = result.tensor
-    solution = result.solutions[0]
-    if isinstance(solution, PipeSolution):
-        record["pipe_resistance"] = asked.pipe_resistance
-    elif asked.method == "exact":
-        bounds = conductivity_bounds(cast("EffectiveConductivity[SteadySolution]", result))[0]
-        record["conductivity_bounds"] = bounds
-        record["model_error_estimate"] = float(bounds[1] / bounds[0] - 1.0) if percolates else 0.0
-    elif asked.method == "chord":
-        record["model_error_estimate"] = chord_error_estimate(solution)
+    if result.bounds is not None:
+        record["conductivity_bounds"] = result.bounds[axis]
+    if np.isfinite(result.model_error):
+        record["model_error_estimate"] = result.model_error
     return record | {
-        "particles": network.packing.count,
-        "density": network.packing.density,
-        "fill_height": find_filling(network.packing).fill_height,
-        "contacts": network.count,
-        "wall_contacts": len(network.walls_of(0)),
+        "particles": medium.packing.count,
+        "density": medium.packing.density,
+        "pore_conductivity": medium.pores.conductivity,
+        "contacts": int(np.count_nonzero(network.angles[:, 0])),
+        "links": network.count,
+        "wall_contacts": len(network.walls_of(axis)),
         "unknowns": result.unknowns,
         "percolates": percolates,
         "status": int(Status.OK if percolates else Status.NOT_PERCOLATING),
@@ -311,10 +305,12 @@ def _print_table(record: dict[str, Any]) -> None:
             continue
         if name == "conductivity_tensor":
             text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
+        elif name == "conductivity_per_axis":
+            text = ", ".join(f"{axis} {k:.8g}" for axis, k in value.items())
         elif name == "conductivity_bounds":
             text = " to ".join(f"{k:.8g}" for k in value)
         else:
             text = f"{value:.8g}" if isinstance(value, float) else str(value)
         unit = " W/(m K)" if name.startswith("conductivity") else ""
-        label = "wall contacts along x" if name == "wall_contacts" else name.replace("_", " ")
+        label = "wall contacts on axis" if name == "wall_contacts" else name.replace("_", " ")
         click.echo(f"{label:24s}{text}{unit}")

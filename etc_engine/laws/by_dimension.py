@@ -107,3 +107,40 @@ def law_of(dimension: int) -> ResistanceLaw:
 def length_scales(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
     """R^(d-2), which multiplies kappa in the resistance of a particle, shape (n,)."""
     return np.asarray(radii ** (dimension - 2))
+
+
+def ball_measure(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+    """Length, area or volume of balls in 1, 2 or 3 dimensions: 2 c, pi c^2, 4/3 pi c^3.
+
+    Examples
+    --------
+    >>> ball_measure(np.array([1.0, 2.0]), 1)
+    array([2., 4.])
+    """
+    return np.asarray((2.0, np.pi, 4.0 / 3.0 * np.pi)[dimension - 1] * radii**dimension)
+
+
+def self_resistance(
+    alpha: NDArray[np.float64], radii: NDArray[np.float64], dimension: int, method: str
+) -> NDArray[np.float64]:
+    """Resistance kappa h_ii between a contact and the mean of its particle, dimensionless or, of spheres, [1/m].
+
+    Parameters
+    ----------
+    alpha : ndarray [rad]
+        Half-angles of the contacts.
+    radii : ndarray [m]
+        Of their particles.
+    dimension : int
+    method : str
+        A name of `ResistanceLaw.self_resistances`.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    """
+    law = law_of(dimension)
+    if method not in law.self_resistances:
+        raise InputError(f"a {law.name} has no method {method!r}: expected {', '.join(law.self_resistances)}")
+    return law.self_resistances[method](alpha) / length_scales(radii, dimension)

@@ -41,6 +41,17 @@ _ENHANCED_DEGREES = np.array([1.0, 2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0])
 _ENHANCED_FACTORS = np.array([0.9799, 0.9762, 0.9729, 0.9707, 0.9693, 0.9682, 0.9675, 0.9672, 0.9671])
 
 
+def position_angles(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Position angle of each arm of a disk, shape (s,) [rad], for arms of shape (s, 2).
+
+    Examples
+    --------
+    >>> position_angles(np.array([[0.0, 2.0], [-1.0, 0.0]])) / np.pi
+    array([0.5, 1. ])
+    """
+    return np.asarray(np.arctan2(arms[:, 1], arms[:, 0]))
+
+
 @njit(cache=True)
 def _remainder(x: float) -> float:
     """C(x) less its singular part zeta(3) + x^2/2 ln x - 3x^2/4, for 0 <= x <= pi."""

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.box import Box
-from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.loads import Links, asked_groups, driven_walls
+from etc_engine.packing.particles import ParticlePacking
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,12 @@ class Backbone:
     spans: tuple[bool, ...]
 
 
-def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
+def find_backbone(
+    network: Links,
+    axes: tuple[int, ...],
+    conducts: NDArray[np.bool_] | None = None,
+    walls_conduct: NDArray[np.bool_] | None = None,
+) -> Backbone:
     """Keep the clusters that span a load axis, and prune their dead ends.
 
     Between walls a cluster spans when it touches both of them; around a periodic box when a path inside
@@ -43,9 +48,12 @@ def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
 
     Parameters
     ----------
-    network : ContactNetwork
+    network : Links
+        Such as a `etc_engine.medium.network.ContactNetwork`.
     axes : tuple of int
         Load axes that share one system: a single walled axis, or periodic axes only.
+    conducts, walls_conduct : ndarray of bool, shapes (m,) and (w,), optional
+        Links that conduct at all; all by default.
 
     Returns
     -------
@@ -65,35 +73,34 @@ def find_backbone(network: ContactNetwork, axes: tuple[int, ...]) -> Backbone:
     >>> find_backbone(bonded_contacts(chain, 0.1), (0,)).spans
     (True,)
     """
-    n = network.packing.count
-    d = network.packing.dimension
-    driven = np.zeros(network.walls.size, dtype=np.bool_)
-    if not network.packing.box.periodic[axes[0]]:
-        driven[network.walls_of(axes[0])] = True
-    clusters, winding = _clusters(n, network.pairs, network.shifts)
-    if network.packing.box.periodic[axes[0]]:
+    n, box = network.packing.count, network.packing.box
+    conducts = np.ones(len(network.pairs), dtype=np.bool_) if conducts is None else conducts
+    driven = driven_walls(network, axes)
+    if walls_conduct is not None:
+        driven &= walls_conduct
+    clusters, winding = _clusters(n, network.pairs[conducts], network.shifts[conducts])
+    if box.periodic[axes[0]]:
         spanning = winding[:, list(axes)]
     else:
-        touches = np.zeros((n, 2 * d), dtype=np.bool_)
-        touches[clusters[network.wall_particles], network.walls] = True
-        low, high = 2 * axes[0], 2 * axes[0] + 1
-        spanning = (touches[:, low] & touches[:, high])[:, None]
+        touches = np.zeros((n, 2), dtype=np.bool_)
+        touches[clusters[network.wall_particles[driven]], network.walls[driven] % 2] = True
+        spanning = (touches[:, 0] & touches[:, 1])[:, None]
     spans = tuple(bool(column.any()) for column in spanning.T)
-    in_play = np.asarray(spanning.any(axis=1))[clusters]
-    kept = _prune(in_play, network.pairs, network.wall_particles[driven])
-    contacts = kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
+    in_play = np.array([row.any() for row in spanning])[clusters]
+    kept = _prune(in_play, network.pairs[conducts], network.wall_particles[driven])
+    contacts = conducts & kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
     wall_contacts = driven & kept[network.wall_particles]
     return Backbone(contacts, wall_contacts, clusters, spans)
 
 
-def restore_dead_ends(network: ContactNetwork, backbone: Backbone) -> Backbone:
+def restore_dead_ends(network: Links, backbone: Backbone) -> Backbone:
     """The same backbone with the dead ends of its clusters.
 
     They pass on no heat, but a contact resolved over its width sees some of it turn back in them.
 
     Parameters
     ----------
-    network : ContactNetwork
+    network : Links
     backbone : Backbone
         Of this network.
     """
@@ -110,68 +117,35 @@ def restore_dead_ends(network: ContactNetwork, backbone: Backbone) -> Backbone:
 
 
 def joined_axes(
-    n: int,
+    packing: ParticlePacking,
     pairs: NDArray[np.int64],
     shifts: NDArray[np.int64],
-    wall_nodes: NDArray[np.int64],
+    wall_particles: NDArray[np.int64],
     walls: NDArray[np.int64],
-    box: Box,
 ) -> tuple[int, ...]:
-    """Axes along which linked nodes join: wrap around the box, or touch both of its walls.
+    """Axes along which linked particles join: wrap around the box, or touch both of its walls.
 
-    Parameters
-    ----------
-    n : int
-        Number of nodes.
-    pairs : ndarray of int, shape (m, 2)
-        Linked nodes.
-    shifts : ndarray of int, shape (m, d)
-        The image of j linked to i lies at ``x_j + shift * lengths``.
-    wall_nodes, walls : ndarray of int, shape (w,)
-        Node and wall of each link to a wall; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end.
-    box : Box
-
-    Returns
-    -------
-    tuple of int
+    Parameters are as in `etc_engine.medium.network.ContactNetwork`.
 
     Examples
     --------
+    >>> from etc_engine.box import Box
     >>> none = np.zeros(0, dtype=np.int64)
-    >>> joined_axes(1, np.array([[0, 0]]), np.array([[1, 0]]), none, none, Box((1.0, 1.0), (True, True)))
+    >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
+    >>> joined_axes(disk, np.array([[0, 0]]), np.array([[1, 0]]), none, none)
     (0,)
     """
+    n, box = packing.count, packing.box
     clusters, winding = _clusters(n, pairs, shifts)
     touches = np.zeros((n, 2 * box.dimension), dtype=np.bool_)
-    touches[clusters[wall_nodes], walls] = True
+    touches[clusters[wall_particles], walls] = True
     spanning = np.where(box.periodic, winding, touches[:, 0::2] & touches[:, 1::2])
     return tuple(int(axis) for axis in np.flatnonzero(spanning.any(axis=0)))
 
 
-def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
-    """Load axes that share a matrix: each walled axis alone, all periodic axes together if no axis is walled.
-
-    Beside a walled axis a periodic one has a system of its own too, because the walls drive only their axis.
-
-    Examples
-    --------
-    >>> load_groups(Box((1.0, 1.0), (True, True))), load_groups(Box((1.0, 1.0), (False, True)))
-    (((0, 1),), ((0,), (1,)))
-    """
-    periodic = tuple(axis for axis in range(box.dimension) if box.periodic[axis])
-    walled = tuple((axis,) for axis in range(box.dimension) if not box.periodic[axis])
-    return tuple(sorted(walled + ((periodic,) if periodic else ())))
-
-
-def find_backbones(network: ContactNetwork, axes: tuple[int, ...] | None = None) -> dict[tuple[int, ...], Backbone]:
+def find_backbones(network: Links, axes: tuple[int, ...] | None = None) -> dict[tuple[int, ...], Backbone]:
     """Backbone of every load group; shared by all contact angles and methods on one network."""
     return {group: find_backbone(network, group) for group in asked_groups(network.packing.box, axes)}
-
-
-def asked_groups(box: Box, axes: tuple[int, ...] | None) -> tuple[tuple[int, ...], ...]:
-    """Load groups that hold one of the axes asked for; all by default."""
-    groups = load_groups(box)
-    return groups if axes is None else tuple(group for group in groups if set(group) & set(axes))
 
 
 @njit(cache=True)

@@ -1,8 +1,12 @@
-"""The effective conductivity tensor of a packing, put together from solutions by groups of load axes."""
+"""Effective conductivity from energies: the only place that divides by a volume or by a cross-section.
+
+Walls: k_aa = E_aa L_a / S_a at a temperature difference of 1, where E_aa is also the heat flow.
+Periodic: k_ab = E_ab / V at mean gradients of 1.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -11,7 +15,8 @@ from numpy.typing import NDArray
 
 from etc_engine.box import AXES, Box
 from etc_engine.errors import ConvergenceError
-from etc_engine.medium.backbone import Backbone, asked_groups
+from etc_engine.medium.backbone import Backbone
+from etc_engine.medium.loads import asked_groups
 from etc_engine.solvers import SolveReport
 
 BALANCE = 1e-6
@@ -31,60 +36,89 @@ class LoadSolution(Protocol):
 
     @property
     def reports(self) -> tuple[SolveReport, ...]:
-        """One a load."""
+        """One per load."""
+
+    def wall_heat(self) -> tuple[float, float]:
+        """Heat flow in at the low wall and out at the far one, between walls only."""
 
 
-Solution = TypeVar("Solution", bound=LoadSolution)
+Solution = TypeVar("Solution")
+Solved = TypeVar("Solved", bound=LoadSolution)
 
 
 @dataclass(frozen=True, eq=False)
 class EffectiveConductivity(Generic[Solution]):
-    """Effective conductivity of one packing.
+    """Effective conductivity of one medium.
 
     Parameters
     ----------
     tensor : ndarray, shape (d, d) [W/(m K)]
         Symmetric for a periodic box; components that walls leave undefined, or that were not asked for, are NaN.
     spans : tuple of bool or None
-        For each axis, whether some cluster of contacts spans it; None if it was not asked for.
+        For each axis, whether something that conducts spans it; None if it was not asked for.
+    unknowns, iterations : int
+        Largest of a load.
+    relative_energy_error : float
+        Largest relative error of the conductivity that the solver is estimated to leave.
     solutions : tuple
         The solutions behind it, each of the type of its engine.
+    model_error : float
+        Estimated relative error of the method or of its discretization; NaN where there is no estimate.
+    bounds : ndarray, shape (d, 2), optional [W/(m K)]
+        Lower and upper bound along each axis, of methods that give them; NaN where it was not asked for.
+    solid_fraction : float
+        Of the particles in the geometry that was solved; NaN where the pores are not resolved.
+    snapshots : int
+        Full solutions that a reduced one is made of, 0 for a full one.
+    certified : bool
+        Whether the error of a reduced solution is a proven bound.
+    seconds : float
     """
 
     tensor: NDArray[np.float64]
     spans: tuple[bool | None, ...]
-    solutions: tuple[Solution, ...]
-
-    @property
-    def unknowns(self) -> int:
-        """Largest number of unknowns of a solve, dead ends taken out."""
-        return max((r.unknowns for s in self.solutions for r in s.reports), default=0)
-
-    @property
-    def iterations(self) -> int:
-        """Largest number of iterations of a solve."""
-        return max((r.iterations for s in self.solutions for r in s.reports), default=0)
-
-    @property
-    def relative_energy_error(self) -> float:
-        """Largest relative error of the conductivity estimated by a solve."""
-        return max((r.relative_energy_error for s in self.solutions for r in s.reports), default=0.0)
+    unknowns: int
+    iterations: int
+    relative_energy_error: float
+    solutions: tuple[Solution, ...] = ()
+    model_error: float = np.nan
+    bounds: NDArray[np.float64] | None = None
+    solid_fraction: float = np.nan
+    snapshots: int = 0
+    certified: bool = False
+    seconds: float = 0.0
 
     @property
     def missing_axes(self) -> str:
-        """Axes that no path of contacts spans, as a word."""
+        """Axes that nothing spans, as a word."""
         return "".join(AXES[axis] for axis, flag in enumerate(self.spans) if flag is False)
 
+    @property
+    def mean(self) -> float:
+        """Mean of the diagonal over the axes asked for [W/(m K)]."""
+        return float(np.nanmean(np.diag(self.tensor)))
 
-def assemble_tensor(
-    box: Box,
-    axes: tuple[int, ...] | None,
-    solve: Callable[[tuple[int, ...]], Solution],
-    wall_heat_flows: Callable[[Solution], tuple[float, float]],
-) -> EffectiveConductivity[Solution]:
+
+def conductivities(box: Box, axes: Sequence[int], energies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Conductivity tensor of a group of load axes from the energies of its loads, shape (k, k) [W/(m K)].
+
+    Parameters
+    ----------
+    box : Box
+    axes : sequence of int
+        A single walled axis, or periodic axes only.
+    energies : ndarray, shape (k, k) [W K, in 2D W K/m]
+        Of every pair of loads: a temperature difference of 1 between walls, mean gradients of 1.
+    """
+    if box.periodic[axes[0]]:
+        return np.asarray(0.5 * (energies + energies.T) / box.volume)
+    return energies * box.lengths[axes[0]] / box.cross_section(axes[0])
+
+
+def effective_tensor(
+    box: Box, axes: tuple[int, ...] | None, solve: Callable[[tuple[int, ...]], Solved]
+) -> EffectiveConductivity[Solved]:
     """Solve every group of load axes and put the tensor together.
-
-    Walls: k_aa = Q L_a / (S_a dT). Periodic: k_ab = (1/area) times the energy of the loads a and b.
 
     Parameters
     ----------
@@ -93,8 +127,6 @@ def assemble_tensor(
         Load axes wanted; all for None.
     solve : callable
         Group of load axes -> solution.
-    wall_heat_flows : callable
-        Solution between walls -> heat flow in at the low wall, and out at the far one [W/m].
 
     Raises
     ------
@@ -108,15 +140,20 @@ def assemble_tensor(
         solution = solve(group)
         for axis, flag in zip(group, solution.backbone.spans, strict=True):
             spans[axis] = flag
-        if box.periodic[group[0]]:
-            spanned = np.outer(solution.backbone.spans, solution.backbone.spans)
-            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume * spanned
-        else:
-            axis, energy = group[0], float(solution.energies[0, 0])
-            check_balance(*wall_heat_flows(solution), energy)
-            tensor[axis, axis] = energy * box.lengths[axis] / box.cross_section(axis)
+        if not box.periodic[group[0]]:
+            check_balance(*solution.wall_heat(), float(solution.energies[0, 0]))
+        spanned = np.outer(solution.backbone.spans, solution.backbone.spans)
+        tensor[np.ix_(group, group)] = conductivities(box, group, solution.energies) * spanned
         solutions.append(solution)
-    return EffectiveConductivity(tensor, tuple(spans), tuple(solutions))
+    reports = [report for solution in solutions for report in solution.reports]
+    return EffectiveConductivity(
+        tensor,
+        tuple(spans),
+        max((report.unknowns for report in reports), default=0),
+        max((report.iterations for report in reports), default=0),
+        max((report.relative_energy_error for report in reports), default=0.0),
+        tuple(solutions),
+    )
 
 
 def check_balance(heat_in: float, heat_out: float, energy: float) -> None:
@@ -131,3 +168,17 @@ def check_balance(heat_in: float, heat_out: float, energy: float) -> None:
             f"the heat flows do not balance: {heat_in:.10g} in, {heat_out:.10g} out, energy {energy:.10g}; "
             f"ask for a smaller tolerance"
         )
+
+
+def affine_conductivity(box: Box, branches: NDArray[np.float64], conductances: NDArray[np.float64]) -> float:
+    """Mean conductivity over the axes of a network of links whose nodes all follow the mean gradient.
+
+    k = 1/(d V) sum_c C_c |b_c|^2, an upper bound of the network in a periodic box.
+
+    Parameters
+    ----------
+    box : Box
+    branches : ndarray, shape (m, d) [m]
+    conductances : ndarray, shape (m,) [W/K, in 2D W/(m K)]
+    """
+    return float(conductances @ (branches**2).sum(axis=1) / (box.dimension * box.volume))

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from etc_engine.errors import InputError
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.laguerre import laguerre_facets, refuse_hidden
@@ -107,15 +106,13 @@ class FacetLinks:
         return normals
 
 
-def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) -> FacetLinks:
+def facet_links(network: ContactNetwork) -> FacetLinks:
     """All links of a packing of spheres: the facets of its Laguerre tessellation, joined with its contacts.
 
     Parameters
     ----------
     network : ContactNetwork
         Three-dimensional; its contacts become contact disks of radius R sin(alpha), the smaller of the two sides'.
-    contact_resistance : float or array_like, shape (contacts + wall contacts,) [K/W]
-        Of each contact of the network.
 
     Returns
     -------
@@ -124,7 +121,7 @@ def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) ->
     Raises
     ------
     InputError, GeometryError
-        If a resistance is negative, the box is not three-dimensional, or a particle is hidden (see
+        If the box is not three-dimensional, or a particle is hidden (see
         `etc_engine.structure.laguerre.refuse_hidden`).
 
     Notes
@@ -143,11 +140,6 @@ def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) ->
     packing = network.packing
     facets = laguerre_facets(packing)
     refuse_hidden(facets)
-    m, w = network.count, network.walls.size
-    resistance = np.asarray(contact_resistance, dtype=np.float64)
-    if not (resistance >= 0.0).all() or resistance.shape not in ((), (m + w,)):
-        raise InputError(f"the contact resistance must be >= 0, one number or an array of shape ({m + w},)")
-    resistance = np.broadcast_to(resistance, (m + w,))
     widths = (packing.radii[network.pairs] * np.sin(network.angles)).min(axis=1, initial=np.inf)
     at, alone = _find(_pair_keys(facets.pairs, facets.shifts), _pair_keys(network.pairs, network.shifts))
     wall_at, wall_alone = _find(
@@ -156,9 +148,14 @@ def facet_links(network: ContactNetwork, contact_resistance: ArrayLike = 0.0) ->
     wall_widths = packing.radii[network.wall_particles] * np.sin(network.wall_angles)
     wall_depths = packing.radii[network.wall_particles] * np.cos(network.wall_angles)
     contacts = [np.zeros(facets.count), widths[alone], np.zeros(facets.walls.size), wall_widths[wall_alone]]
-    bonds = [np.zeros(facets.count), resistance[:m][alone], np.zeros(facets.walls.size), resistance[m:][wall_alone]]
+    bonds = [
+        np.zeros(facets.count),
+        network.resistances[alone],
+        np.zeros(facets.walls.size),
+        network.wall_resistances[wall_alone],
+    ]
     contacts[0][at], contacts[2][wall_at] = widths[~alone], wall_widths[~wall_alone]
-    bonds[0][at], bonds[2][wall_at] = resistance[:m][~alone], resistance[m:][~wall_alone]
+    bonds[0][at], bonds[2][wall_at] = network.resistances[~alone], network.wall_resistances[~wall_alone]
     return FacetLinks(
         packing,
         np.concatenate([facets.pairs, network.pairs[alone]]),

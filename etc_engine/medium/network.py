@@ -1,6 +1,6 @@
-"""ContactNetwork: who touches whom, in which direction and through how wide an arc.
+"""ContactNetwork: who touches whom, in which direction, through how wide a contact and against which resistance.
 
-The network is the shared currency of the engine: `dtem`, `pipe` and `lattice` start from one.
+The network is the shared currency of the engines that work on contacts.
 """
 
 from __future__ import annotations
@@ -9,56 +9,71 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import InputError
+from etc_engine.laws.by_dimension import ball_measure, law_of
 from etc_engine.packing.particles import ParticlePacking
+
+LARGEST = 1e100
+"""Of a resistance: products of a few of them stay finite."""
 
 
 @dataclass(frozen=True, eq=False)
 class ContactNetwork:
-    """Contacts between particles, and between particles and walls.
+    """Links between particles, and between particles and walls.
 
     Parameters
     ----------
     packing : ParticlePacking
         The particles, n of them in d dimensions.
     pairs : ndarray of int, shape (m, 2)
-        Row numbers (i, j), i <= j, of the particles in contact.
+        Row numbers (i, j), i <= j, of the linked particles.
     shifts : ndarray of int, shape (m, d)
         The image of j that i touches: its centre lies at ``x_j + shift * lengths``.
     angles : ndarray, shape (m, 2) [rad]
-        Half-angles of the contact arc on i and on j.
+        Half-angle of the contact on i and on j; 0 on a link without a contact, a gap.
+    resistances : ndarray, shape (m,) [K/W, in 2D m K/W]
+        Resistance of each contact, in series with what the particles resist.
     wall_particles, walls : ndarray of int, shape (w,)
         Particle and wall of each wall contact; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end.
     wall_angles : ndarray, shape (w,) [rad]
-        Half-angle of the wall contact's arc.
-    geometric : bool
-        Whether the arcs are those that particles and walls cut out of each other, not prescribed ones.
+        Half-angle of each wall contact.
+    wall_resistances : ndarray, shape (w,) [K/W, in 2D m K/W]
+        Resistance of each wall contact.
+    rule : str
+        Name of the contact rule that made it, a key of `etc_engine.medium.rules.RULES`.
 
     Notes
     -----
-    Position angles follow from the branch vectors; they are not stored.
+    Directions follow from the branch vectors; they are not stored.
     """
 
     packing: ParticlePacking
     pairs: NDArray[np.int64]
     shifts: NDArray[np.int64]
     angles: NDArray[np.float64]
+    resistances: NDArray[np.float64]
     wall_particles: NDArray[np.int64]
     walls: NDArray[np.int64]
     wall_angles: NDArray[np.float64]
-    geometric: bool = False
+    wall_resistances: NDArray[np.float64]
+    rule: str
 
     @property
     def count(self) -> int:
-        """Number of contacts between particles."""
+        """Number of links between particles."""
         return int(self.pairs.shape[0])
 
     @property
+    def geometric(self) -> bool:
+        """Whether the contacts are those that particles and walls cut out of each other, not prescribed ones."""
+        return self.rule == "overlap"
+
+    @property
     def coordination(self) -> float:
-        """Mean number of particle contacts per particle, 2 m / n; walls do not count."""
-        return 2.0 * self.count / self.packing.count
+        """Mean number of particle contacts per particle, 2 m / n; walls and gaps do not count."""
+        return 2.0 * int(np.count_nonzero(self.angles[:, 0])) / self.packing.count
 
     @cached_property
     def branches(self) -> NDArray[np.float64]:
@@ -78,20 +93,100 @@ class ContactNetwork:
             self,
             angles=np.full_like(self.angles, half_angle),
             wall_angles=np.full_like(self.wall_angles, half_angle),
-            geometric=False,
+            rule="bonded" if self.geometric else self.rule,
         )
 
+    def with_resistance(self, resistance: ArrayLike) -> ContactNetwork:
+        """The same contacts with given resistances.
+
+        Parameters
+        ----------
+        resistance : float or array_like, shape (m + w,) [K/W, in 2D m K/W]
+            Of all contacts, or of each particle contact and then each wall contact.
+
+        Raises
+        ------
+        InputError
+            If a resistance is negative or not finite, or there are not as many as contacts.
+        """
+        values = _resistances(resistance, self.count + self.walls.size)
+        return replace(self, resistances=values[: self.count], wall_resistances=values[self.count :])
+
+    def with_area_resistance(self, area_resistance: ArrayLike) -> ContactNetwork:
+        """The same contacts with the resistance of a unit of contact area over each contact's area.
+
+        Parameters
+        ----------
+        area_resistance : float or array_like, shape (m + w,) [m2 K/W]
+            Of all contacts, or of each particle contact and then each wall contact.
+
+        Raises
+        ------
+        InputError
+            As `with_resistance`.
+
+        Notes
+        -----
+        The area of a contact is the chord 2 R sin(alpha) of a disk per unit thickness and the disk pi (R sin(alpha))^2
+        of a sphere; where both sides of a contact have one, the smaller counts.
+        """
+        values = _resistances(area_resistance, self.count + self.walls.size)
+        radii = self.packing.radii
+        reach = np.concatenate(
+            [
+                (radii[self.pairs] * np.sin(self.angles)).min(axis=1),
+                radii[self.wall_particles] * np.sin(self.wall_angles),
+            ]
+        )
+        return self.with_resistance(values / ball_measure(reach, self.packing.dimension - 1))
+
+    def cut_measures(self, *, prescribed: bool = False) -> NDArray[np.float64]:
+        """Area (volume) of each particle less what its contacts cut off, shape (n,) [m2, in 3D m3].
+
+        V = |ball| - sum_i of the segments (caps) beyond the contacts, walls of all kinds included; they are taken for
+        disjoint, as contacts must be.
+
+        Parameters
+        ----------
+        prescribed : bool
+            Whether contacts of prescribed width cut too; geometric ones always do.
+        """
+        packing = self.packing
+        if not (self.geometric or prescribed):
+            return packing.measures
+        owner = np.concatenate([self.pairs[:, 0], self.pairs[:, 1], self.wall_particles])
+        alpha = np.concatenate([self.angles[:, 0], self.angles[:, 1], self.wall_angles])
+        cut = np.bincount(owner, law_of(packing.dimension).cut(alpha), minlength=packing.count)
+        return np.asarray(packing.measures - packing.radii**packing.dimension * cut)
+
     def select(self, contacts: NDArray[np.bool_], wall_contacts: NDArray[np.bool_]) -> ContactNetwork:
-        """The network of the marked contacts; the particles stay."""
+        """The network of the marked links; the particles stay."""
         return replace(
             self,
             pairs=self.pairs[contacts],
             shifts=self.shifts[contacts],
             angles=self.angles[contacts],
+            resistances=self.resistances[contacts],
             wall_particles=self.wall_particles[wall_contacts],
             walls=self.walls[wall_contacts],
             wall_angles=self.wall_angles[wall_contacts],
+            wall_resistances=self.wall_resistances[wall_contacts],
         )
+
+
+def _resistances(values: ArrayLike, size: int) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim and array.shape != (size,):
+        raise InputError(
+            f"the contact resistance must be one number or an array of shape ({size},), found {array.shape}"
+        )
+    bad = ~((array >= 0.0) & (array <= LARGEST))
+    if bad.any():
+        found = array[bad].flat[0]
+        if np.isfinite(found) and found > 0.0:
+            raise InputError(f"the contact resistance must be at most {LARGEST:g}, found {found:g}")
+        raise InputError(f"the contact resistance must be >= 0 and finite, found {found:g}")
+    return np.broadcast_to(array, (size,)).copy()
 
 
 def check_half_angle(half_angle: float) -> None:

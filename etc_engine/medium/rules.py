@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -72,7 +75,7 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
     wall_particles, walls, wall_distances = _wall_distances(packing, ROUND_OFF_OVERLAP, -1.0)
     wall_radii = radii[wall_particles]
     wall_angles = 2.0 * np.arcsin(np.sqrt(np.clip((wall_radii - wall_distances) / (2.0 * wall_radii), 0.0, 1.0)))
-    return ContactNetwork(packing, pairs, shifts, angles, wall_particles, walls, wall_angles, geometric=True)
+    return _without_resistance(packing, (pairs, shifts, angles), (wall_particles, walls, wall_angles), "overlap")
 
 
 def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float = 1e-6) -> ContactNetwork:
@@ -104,20 +107,9 @@ def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float
     >>> network.count, network.walls.tolist()
     (1, [0, 1])
     """
-    check_half_angle(half_angle)
     if not (np.isfinite(bond_gap) and bond_gap >= 0.0):
         raise InputError(f"the bond gap must be a number of mean radii >= 0, found {bond_gap}")
-    near = neighbor_pairs(packing, relative_gap=bond_gap)
-    wall_particles, walls, _ = _wall_distances(packing, bond_gap, 1.0)
-    return ContactNetwork(
-        packing,
-        near.pairs,
-        near.shifts,
-        np.full((near.count, 2), float(half_angle)),
-        wall_particles,
-        walls,
-        np.full(walls.size, float(half_angle)),
-    )
+    return _bonded(find_neighbors(packing, bond_gap), half_angle, "bonded")
 
 
 def coordination_contacts(packing: ParticlePacking, half_angle: float, coordination: float) -> ContactNetwork:
@@ -150,6 +142,36 @@ def coordination_contacts(packing: ParticlePacking, half_angle: float, coordinat
     >>> coordination_contacts(packing, 0.1, 2 / 3).pairs.tolist()
     [[0, 1]]
     """
+    return _bonded(closest_neighbors(packing, coordination), half_angle, "coordination")
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbors:
+    """Who touches whom, without a width.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+    pairs, shifts, wall_particles, walls : ndarray of int
+        As in `ContactNetwork`.
+    """
+
+    packing: ParticlePacking
+    pairs: NDArray[np.int64]
+    shifts: NDArray[np.int64]
+    wall_particles: NDArray[np.int64]
+    walls: NDArray[np.int64]
+
+
+def find_neighbors(packing: ParticlePacking, gap: float) -> Neighbors:
+    """Particles and walls whose surfaces are at most a gap apart, in mean radii of a pair and radii at a wall."""
+    near = neighbor_pairs(packing, relative_gap=gap)
+    wall_particles, walls, _ = _wall_distances(packing, gap, 1.0)
+    return Neighbors(packing, near.pairs, near.shifts, wall_particles, walls)
+
+
+def closest_neighbors(packing: ParticlePacking, coordination: float) -> Neighbors:
+    """The closest pairs, as many as give a mean coordination number, as in `coordination_contacts`."""
     wanted = round(0.5 * coordination * packing.count) if np.isfinite(coordination) else 0
     if wanted < 1:
         raise InputError(f"the mean coordination number must be positive (at least one contact), found {coordination}")
@@ -158,11 +180,68 @@ def coordination_contacts(packing: ParticlePacking, half_angle: float, coordinat
         if near.count >= wanted:
             relative = near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))
             gap = float(np.partition(relative, wanted - 1)[wanted - 1])
-            return bonded_contacts(packing, half_angle, max(gap, 0.0) * (1.0 + 1e-12))
+            return find_neighbors(packing, max(gap, 0.0) * (1.0 + 1e-12))
     raise InputError(
         f"a mean coordination number of {coordination:g} is out of reach: only {near.count} pairs of "
         f"{packing.count} particles are closer than two mean radii, {wanted} are needed"
     )
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A contact rule by its word.
+
+    Parameters
+    ----------
+    contacts : callable
+        (packing, **values) -> ContactNetwork.
+    keys : mapping of str to str
+        Key of a study -> argument of the function, angles in radians.
+    dimensions : tuple of int
+    """
+
+    contacts: Callable[..., ContactNetwork]
+    keys: Mapping[str, str]
+    dimensions: tuple[int, ...] = (2, 3)
+
+
+RULES: Mapping[str, Rule] = {
+    "overlap": Rule(overlap_contacts, {}),
+    "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
+    "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
+}
+
+
+def find_rule(word: str) -> Rule:
+    """The rule of that word.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if word not in RULES:
+        raise InputError(f"unknown contact rule {word!r}: expected {', '.join(RULES)}")
+    return RULES[word]
+
+
+def _bonded(near: Neighbors, half_angle: float, rule: str) -> ContactNetwork:
+    """Contacts of one half-angle between all neighbours."""
+    check_half_angle(half_angle)
+    links = near.pairs, near.shifts, np.full(near.pairs.shape, float(half_angle))
+    at_walls = near.wall_particles, near.walls, np.full(near.walls.size, float(half_angle))
+    return _without_resistance(near.packing, links, at_walls, rule)
+
+
+def _without_resistance(
+    packing: ParticlePacking,
+    links: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
+    at_walls: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
+    rule: str,
+) -> ContactNetwork:
+    """A network of perfect contacts: (pairs, shifts, angles) and (particles, walls, angles)."""
+    none, none_at_walls = np.zeros(len(links[0])), np.zeros(len(at_walls[0]))
+    return ContactNetwork(packing, *links, none, *at_walls, none_at_walls, rule)
 
 
 def _chord_angle(

@@ -33,13 +33,9 @@ class InsulatedCuts:
     arms: NDArray[np.float64]
     alpha: NDArray[np.float64]
 
-    @property
-    def theta(self) -> NDArray[np.float64]:
-        """Position angle of each cut of a disk, shape (c,) [rad]."""
-        return np.arctan2(self.arms[:, 1], self.arms[:, 0])
 
-
-NO_CUTS = InsulatedCuts(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros((0, 2)), np.zeros(0))
+NONE = np.zeros(0, dtype=np.int64)
+NO_CUTS = InsulatedCuts(NONE, NONE, np.zeros((0, 2)), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +51,17 @@ class ContactSides:
     arms : ndarray, shape (s, d) [m]
         Vector from the particle's centre towards the contact; at the two sides of a particle contact they
         differ by the branch vector.
-    theta : ndarray, shape (s,) [rad]
-        Position angle of the contact.
     alpha : ndarray, shape (s,) [rad]
-        Half-angle of the contact's arc.
+        Half-angle of the contact.
+    resistances : ndarray, shape (s,) [K/W, in 2D m K/W]
+        Part of the contact's resistance that belongs to the side: half of it on either side of a particle contact,
+        all of it on the one side of a wall contact.
+    radii : ndarray, shape (n,) [m]
+        Of the particles.
     of_contacts : ndarray of int, shape (m, 2)
         The two sides of each particle contact.
     of_walls : ndarray of int, shape (w,)
         The side of each wall contact.
-    radii : ndarray, shape (n,) [m]
-        Of the particles.
     cuts : InsulatedCuts
         What insulated walls cut off; only ``exact`` heeds it.
     """
@@ -72,16 +69,16 @@ class ContactSides:
     offsets: NDArray[np.int64]
     nodes: NDArray[np.int64]
     arms: NDArray[np.float64]
-    theta: NDArray[np.float64]
     alpha: NDArray[np.float64]
+    resistances: NDArray[np.float64]
+    radii: NDArray[np.float64]
     of_contacts: NDArray[np.int64]
     of_walls: NDArray[np.int64]
-    radii: NDArray[np.float64]
     cuts: InsulatedCuts = NO_CUTS
 
     @property
     def dimension(self) -> int:
-        """2 or 3."""
+        """2 for disks, 3 for spheres."""
         return int(self.arms.shape[1])
 
     @property
@@ -135,20 +132,21 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
         ]
     )
     alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
+    half = 0.5 * network.resistances
+    resistances = np.concatenate([half, half, network.wall_resistances])
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=packing.count))])
     place = np.empty_like(order)
     place[order] = np.arange(order.size)
-    arms = arms[order]
     return ContactSides(
         offsets=offsets,
         nodes=nodes[order],
-        arms=arms,
-        theta=np.arctan2(arms[:, 1], arms[:, 0]),
+        arms=arms[order],
         alpha=alpha[order],
+        resistances=resistances[order],
+        radii=packing.radii,
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],
-        radii=packing.radii,
         cuts=cuts,
     )
 
@@ -166,41 +164,22 @@ def check_arcs(sides: ContactSides) -> None:
 
 def refuse_overlap(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
     """Raise the error of `check_arcs` for the contacts ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
-    particle, a, b, apart = _overlapping(offsets, np.ascontiguousarray(arms), alpha)
-    if particle >= 0:
-        widths = np.degrees(alpha[[a, b]])
+    normals = unit_vectors(arms)
+    number, a, b = _close_pairs(offsets, normals, alpha, 1.0)
+    if number:
+        particle = int(np.searchsorted(offsets, a, side="right")) - 1
+        apart = 2.0 * np.degrees(np.arcsin(min(0.5 * float(np.linalg.norm(normals[a] - normals[b])), 1.0)))
         raise GeometryError(
-            f"two contact {law_of(arms.shape[1]).contact}s of particle {particle} overlap: {np.degrees(apart):.4g} "
-            f"degrees apart with half-angles {widths[0]:.4g} and {widths[1]:.4g}; use smaller contact angles or less "
-            f"overlap"
+            f"two contact {law_of(arms.shape[1]).contact}s of particle {particle} overlap: {apart:.4g} degrees apart "
+            f"with half-angles {np.degrees(alpha[a]):.4g} and {np.degrees(alpha[b]):.4g}; use smaller contact angles "
+            f"or less overlap"
         )
 
 
-@njit(cache=True)
-def _separation(arms: NDArray[np.float64], a: int, b: int) -> float:
-    """Angle between two directions, 2 arcsin(|u - v|/2) of the unit vectors u and v."""
-    d = arms.shape[1]
-    first, second, square = 0.0, 0.0, 0.0
-    for axis in range(d):
-        first += arms[a, axis] ** 2
-        second += arms[b, axis] ** 2
-    for axis in range(d):
-        square += (arms[a, axis] / np.sqrt(first) - arms[b, axis] / np.sqrt(second)) ** 2
-    return 2.0 * np.arcsin(min(1.0, 0.5 * np.sqrt(square)))
-
-
-@njit(cache=True)
-def _overlapping(
-    offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]
-) -> tuple[int, int, int, float]:
-    """First particle with overlapping contacts, the two sides and the angle between them, or -1."""
-    for p in range(offsets.size - 1):
-        for a in range(offsets[p], offsets[p + 1]):
-            for b in range(offsets[p], a):
-                separation = _separation(arms, a, b)
-                if separation < alpha[a] + alpha[b]:
-                    return p, a, b, separation
-    return -1, -1, -1, 0.0
+def unit_vectors(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions of arms, shape (s, d)."""
+    lengths = np.sqrt((arms**2).sum(axis=1))
+    return np.ascontiguousarray(arms / np.where(lengths > 0.0, lengths, 1.0)[:, None])
 
 
 def count_close_arcs(sides: ContactSides) -> int:
@@ -209,15 +188,27 @@ def count_close_arcs(sides: ContactSides) -> int:
     There the flux through one contact feels the other, and ``chord``, which takes every source for a far one,
     loses its accuracy.
     """
-    return int(_close(sides.offsets, np.ascontiguousarray(sides.arms), sides.alpha))
+    return int(_close_pairs(sides.offsets, unit_vectors(sides.arms), sides.alpha, 2.0)[0])
 
 
 @njit(cache=True)
-def _close(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> int:
-    number = 0
+def _close_pairs(
+    offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha: NDArray[np.float64], factor: float
+) -> tuple[int, int, int]:
+    """Number of pairs on one particle closer than ``factor`` times the sum of their half-angles, and the first of them.
+
+    The chord |n_a - n_b| = 2 sin(separation/2) keeps its digits for near directions, in 2D and 3D.
+    """
+    number, first, second = 0, -1, -1
     for p in range(offsets.size - 1):
         for a in range(offsets[p], offsets[p + 1]):
             for b in range(offsets[p], a):
-                if _separation(arms, a, b) < 2.0 * (alpha[a] + alpha[b]):
+                square = 0.0
+                for k in range(normals.shape[1]):
+                    square += (normals[a, k] - normals[b, k]) ** 2
+                reach = min(factor * (alpha[a] + alpha[b]), np.pi)
+                if np.sqrt(square) < 2.0 * np.sin(0.5 * reach):
+                    if number == 0:
+                        first, second = a, b
                     number += 1
-    return number
+    return number, first, second

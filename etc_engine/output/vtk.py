@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.field import ParticleField
-from etc_engine.engines.dtem.interior import temperatures_inside
-from etc_engine.engines.dtem.steady import SteadySolution
-from etc_engine.engines.pipe.steady import PipeSolution
 from etc_engine.errors import InputError, OutputError
+from etc_engine.medium.field import ParticleField
 
 RINGS, SPOKES = 6, 36
 """A disk is drawn as this many rings of quadrilaterals, finer towards its boundary, around a fan."""
 DETAILED = 20_000
-"""Above this many particles, and in a pipe network, each is one polygon of its mean temperature."""
+"""Above this many particles, and where nothing is known inside them, each is one polygon of its mean temperature."""
 
 
-def write_vtp(path: Path, solution: SteadySolution | PipeSolution, field: ParticleField) -> None:
+def write_vtp(path: Path, field: ParticleField) -> None:
     """Write a ``.vtp`` file: polygons of the particles, lines of the contacts.
 
     Point data ``temperature``; cell data ``particle`` (-1 on lines), ``mean_temperature`` and ``heat_flow`` (0 on
@@ -29,12 +26,14 @@ def write_vtp(path: Path, solution: SteadySolution | PipeSolution, field: Partic
     Raises
     ------
     InputError
-        If the name does not end in ``.vtp`` or the library ``vtk`` is missing.
+        If the name does not end in ``.vtp``, the particles are no disks, or the library ``vtk`` is missing.
     OutputError
         If the file cannot be written.
     """
     if path.suffix != ".vtp":
         raise InputError(f"VTK PolyData is written to a .vtp file, found {path.name!r}")
+    if field.medium.dimension != 2:
+        raise InputError("VTK PolyData of a solve draws disks, the particles are spheres: write a netCDF file with -o")
     try:
         from vtkmodules.util.numpy_support import numpy_to_vtk
         from vtkmodules.vtkCommonCore import vtkPoints
@@ -44,8 +43,8 @@ def write_vtp(path: Path, solution: SteadySolution | PipeSolution, field: Partic
         raise InputError(
             "writing VTK files needs the library vtk: install the extra with pip install 'etc-engine[vtk]'"
         ) from None
-    points, temperature, polygons, owner = _disks(solution, field)
-    lines, flow = _contacts(solution, field)
+    points, temperature, polygons, owner = _disks(field)
+    lines, flow = _contacts(field)
     ends = np.concatenate([points, lines.reshape(-1, 2)])
     mean = np.concatenate([np.full(len(flow), np.nan), field.particle_temperatures[owner]])
     data = vtkPolyData()
@@ -86,13 +85,13 @@ def vtk_cells(groups: list[NDArray[np.int64]]) -> Any:
 
 
 def _disks(
-    solution: SteadySolution | PipeSolution, field: ParticleField
+    field: ParticleField,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.int64]], NDArray[np.int64]]:
     """Points, their temperatures, polygons as lists of point numbers by width, and the particle of each polygon."""
-    packing = solution.network.packing
+    packing = field.medium.packing
     turn = 2.0 * np.pi * np.arange(SPOKES) / SPOKES
     rim = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    if packing.count > DETAILED or isinstance(solution, PipeSolution):
+    if packing.count > DETAILED or field.inside is None:
         points = (packing.centers[:, None] + packing.radii[:, None, None] * rim).reshape(-1, 2)
         polygons = np.arange(len(points)).reshape(-1, SPOKES)
         return points, np.repeat(field.particle_temperatures, SPOKES), [polygons], np.arange(packing.count)
@@ -109,17 +108,15 @@ def _disks(
     quadrilaterals = (np.concatenate(quads) + base).reshape(-1, 4)
     particle = np.repeat(np.arange(packing.count), len(unit))
     offsets = packing.radii[particle, None] * np.tile(unit, (packing.count, 1))
-    temperature = temperatures_inside(solution, field, particle, offsets)
+    temperature = field.inside(particle, offsets)
     owner = np.concatenate(
         [np.repeat(np.arange(packing.count), SPOKES), np.repeat(np.arange(packing.count), SPOKES * (RINGS - 1))]
     )
     return packing.centers[particle] + offsets, temperature, [triangles, quadrilaterals], owner
 
 
-def _contacts(
-    solution: SteadySolution | PipeSolution, field: ParticleField
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _contacts(field: ParticleField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Ends of the line of each contact, centre to centre, shape (m, 2, 2), and its heat flow."""
-    network = solution.network
+    network = field.medium.links
     start = network.packing.centers[network.pairs[:, 0]]
     return np.stack([start, start + network.branches], axis=1), field.contact_flows

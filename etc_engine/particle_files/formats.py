@@ -182,6 +182,17 @@ def read_particles(
         return make_table(kind.rows(place, chosen), chosen)
 
 
+def read_rows(path: Path | str, sample: Sample | None = None) -> Rows:
+    """Rows of one frame of a file of any known format, without asking for a box.
+
+    Raises
+    ------
+    InputError
+    """
+    with seekable_copy(path) as place:
+        return format_to_read(place).rows(place, sample or Sample())
+
+
 def count_frames(path: Path | str) -> int:
     """Number of packings in a file.
 

@@ -1,30 +1,24 @@
-"""One realization: pack, find contacts, conduct."""
+"""One realization: pack, find contacts, conduct; and the table of engines."""
 
-from etc_engine.realization.engines import ENGINES, Engine, realize
-from etc_engine.realization.networks import conduct_dtem
-from etc_engine.realization.outcome import Cell, Cells, Realization, Status
-from etc_engine.realization.specification import (
-    CompositeSpec,
-    ConductionSpec,
-    ContactSpec,
-    Mixture,
-    RealizationSpec,
-    particle_conductivities,
-)
+from etc_engine.medium.conduction import Conduction
+from etc_engine.realization.engines import ENGINES, Engine, Method, effective_conductivity, field_along, find_engine
+from etc_engine.realization.outcome import Outcome, Realization, Status
+from etc_engine.realization.realize import realize
+from etc_engine.realization.specification import RealizationSpec
+from etc_engine.realization.transients import transient_system
 
 __all__ = [
     "ENGINES",
-    "Cell",
-    "Cells",
-    "CompositeSpec",
-    "ConductionSpec",
-    "ContactSpec",
+    "Conduction",
     "Engine",
-    "Mixture",
+    "Method",
+    "Outcome",
     "Realization",
     "RealizationSpec",
     "Status",
-    "conduct_dtem",
-    "particle_conductivities",
+    "effective_conductivity",
+    "field_along",
+    "find_engine",
     "realize",
+    "transient_system",
 ]

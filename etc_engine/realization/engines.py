@@ -1,79 +1,403 @@
-"""The engines by name, and one realization from packing to cells. Serial, no I/O, no MPI."""
+"""The engines by name. A row says what an engine can do, and is all that the other rooms ask about it."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from etc_engine.engines.dtem.methods import METHODS as DTEM_METHODS
-from etc_engine.errors import PackingError
-from etc_engine.packing import ParticlePacking, pack
-from etc_engine.realization.composites import conduct_lattice, conduct_voxel
-from etc_engine.realization.networks import conduct_dtem, conduct_pipe
-from etc_engine.realization.outcome import Cell, Cells, Realization, Status, uniform_cells
-from etc_engine.realization.specification import RealizationSpec
-from etc_engine.structure.union import solid_fraction
+from etc_engine.box import AXES
+from etc_engine.engines.dtem import conductivity as dtem
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.methods import dimensions_of
+from etc_engine.engines.dtem.transient import element_system
+from etc_engine.engines.lattice import homogenize as lattice
+from etc_engine.engines.pipe import steady as pipe
+from etc_engine.engines.pipe.field import pipe_field
+from etc_engine.engines.pipe.transient import pipe_system
+from etc_engine.engines.voxel import homogenize as voxel
+from etc_engine.engines.voxel.section import section_of
+from etc_engine.errors import EtcError, InputError
+from etc_engine.medium.conduction import Conduction, Result
+from etc_engine.medium.conductivity import EffectiveConductivity
+from etc_engine.medium.field import ParticleField
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.transient import ParticleSystem
+from etc_engine.realization.options import ANGLE_CURVE, BOUNDARY, DIPOLES, GREEN, MODES, Option, whole_number, word_of
+from etc_engine.realization.outcome import Outcome, outcome_of
+
+NO, MAY, MUST = "no", "may", "must"
+"""Whether the pores of a medium conduct: not with this method, if they do, or always."""
+
+PARTICLE_BYTES, VOXEL_BYTES, NODE_BYTES = 1600.0, 300.0, 3000.0
+"""Measured peaks of memory per particle, voxel and lattice node."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method of an engine.
+
+    Parameters
+    ----------
+    description : str
+    dimensions : tuple of int
+        Of the boxes it works in.
+    contacts : bool
+        Whether it needs a contact network.
+    pores : str
+        ``no``, ``may`` or ``must`` conduct.
+    transient : bool
+        Whether it has a transient form.
+    options : tuple of str
+        Options of the engine that it heeds.
+    """
+
+    description: str
+    dimensions: tuple[int, ...]
+    contacts: bool = True
+    pores: str = NO
+    transient: bool = False
+    options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Engine:
-    """One way to conduct heat through a packing.
+    """One way to conduct heat through a medium.
 
     Parameters
     ----------
-    conduct : callable
-        (packing, spec, rng) -> cells, by contact angle (or contrast) and method.
-    methods : tuple of str
-        The variants it knows, the default first.
-    dimensions : tuple of int
-        Of the boxes it works in.
-    composite : bool
-        Whether the particles sit in a matrix that conducts; otherwise heat goes through their contacts alone.
+    name, description : str
+    methods : mapping of str to Method
+        The first that fits is the default, see `default_method`.
+    solve : callable
+        (media, conduction, seed) -> one result per medium.
+    options : mapping of str to Option
+        Further choices by name.
+    system : callable, optional
+        (medium, walls, method=, source=, options) -> ParticleSystem, of methods with a transient form.
+    recover : callable, optional
+        (medium, method, solution, load) -> ParticleField of one load of a solution.
+    section : callable, optional
+        (medium, method=, options) -> section through the heat flux, for a picture.
+    remarks : callable
+        (method, result) -> what a user should know about the accuracy of a result.
+    memory : callable
+        (edge lengths, particles, options) -> expected bytes of a rank, particles included.
     """
 
-    conduct: Callable[[ParticlePacking, RealizationSpec, np.random.Generator], Cells]
-    methods: tuple[str, ...]
-    dimensions: tuple[int, ...]
-    composite: bool = False
+    name: str
+    description: str
+    methods: Mapping[str, Method]
+    solve: Callable[[Sequence[Medium], Conduction, int], list[Result]]
+    options: Mapping[str, Option] = field(default_factory=dict)
+    system: Callable[..., ParticleSystem] | None = None
+    recover: Callable[[Medium, str, Any, int], ParticleField] | None = None
+    section: Callable[..., Any] | None = None
+    remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
+    memory: Callable[[Sequence[float], float, Mapping[str, Any]], float] = lambda _, n, __: PARTICLE_BYTES * n
+
+    @property
+    def dimensions(self) -> tuple[int, ...]:
+        """Of the boxes that one of its methods works in."""
+        return tuple(sorted({d for method in self.methods.values() for d in method.dimensions}))
+
+    @property
+    def needs_contacts(self) -> bool:
+        """Whether its methods work on a contact network; otherwise they resolve the pores."""
+        return all(method.contacts for method in self.methods.values())
+
+    def default_method(self, dimension: int, pores_conduct: bool) -> str:
+        """The first method that works in a dimension and with pores that conduct or do not.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        for name, method in self.methods.items():
+            if dimension in method.dimensions and method.pores in ((MAY, MUST) if pores_conduct else (NO, MAY)):
+                return name
+        if dimension not in self.dimensions:
+            works = " and ".join(f"{d}D" for d in self.dimensions)
+            raise InputError(f"engine {self.name} works in {works}, found a medium in {dimension}D")
+        what = "pores that conduct" if pores_conduct else "pores that do not conduct"
+        raise InputError(f"engine {self.name} has no method for {what} in {dimension}D: use another engine")
+
+    def find_method(self, name: str) -> Method:
+        """The method of a name.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        if name not in self.methods:
+            raise InputError(f"engine {self.name} has no method {name!r}: expected one of {', '.join(self.methods)}")
+        return self.methods[name]
+
+    def resolve(self, method: str, options: Mapping[str, Any]) -> dict[str, Any]:
+        """The options that a method heeds, checked, with the defaults of those that are not given.
+
+        Raises
+        ------
+        InputError
+            If an option is unknown, means nothing to the method or has a value that is not allowed.
+        """
+        heeded = self.find_method(method).options
+        for name in options:
+            if name not in heeded:
+                known = f"it heeds {', '.join(heeded)}" if heeded else "it heeds none"
+                raise InputError(f"option {name} means nothing to method {method} of engine {self.name}: {known}")
+        return {name: self.options[name].checked(name, options.get(name)) for name in heeded}
+
+    def check(self, medium: Medium, method: str) -> None:
+        """Refuse a medium that a method cannot take.
+
+        Raises
+        ------
+        InputError
+        """
+        row = self.find_method(method)
+        if medium.dimension not in row.dimensions:
+            works = " and ".join(f"{d}D" for d in row.dimensions)
+            raise InputError(
+                f"method {method} of engine {self.name} works in {works}, found a medium in {medium.dimension}D"
+            )
+        if row.contacts and medium.network is None:
+            raise InputError(f"engine {self.name} needs contacts: give the medium a contact network")
+        if row.pores == NO and medium.pores.conduct:
+            able = [name for name, other in self.methods.items() if other.pores != NO]
+            cure = f"use {' or '.join(able)}" if able else "use another engine, or pores that do not conduct"
+            raise InputError(f"method {method} of engine {self.name} takes no heat through the pores: {cure}")
+        if row.pores == MUST and not medium.pores.conduct:
+            raise InputError(f"method {method} of engine {self.name} is only valid with pores that conduct")
+
+    def conduct(self, media: Sequence[Medium], conduction: Conduction, seed: int) -> list[Outcome]:
+        """Outcome of every medium, in order; an error of one becomes its status.
+
+        Parameters
+        ----------
+        media : sequence of Medium
+            Variants on one packing: what they share is shared.
+        conduction : Conduction
+        seed : int
+            Of everything that the engine draws, the same for all media.
+        """
+        return [
+            outcome_of(medium, result)
+            for medium, result in zip(media, self.results(media, conduction, seed), strict=True)
+        ]
+
+    def results(self, media: Sequence[Medium], conduction: Conduction, seed: int) -> list[Result]:
+        """Conductivity or error of every medium, as in `conduct`."""
+        found: list[Result | None] = [self._refusal(medium, conduction) for medium in media]
+        solvable = [row for row, refusal in enumerate(found) if refusal is None]
+        if solvable:
+            task = Conduction(
+                conduction.engine,
+                conduction.method,
+                self.resolve(conduction.method, conduction.options),
+                conduction.tolerance,
+                conduction.axes,
+            )
+            try:
+                solved = self.solve([media[row] for row in solvable], task, seed)
+            except EtcError as error:
+                solved = [error] * len(solvable)
+            for row, result in zip(solvable, solved, strict=True):
+                found[row] = result
+        return [result for result in found if result is not None]
+
+    def _refusal(self, medium: Medium, conduction: Conduction) -> EtcError | None:
+        try:
+            self.check(medium, conduction.method)
+            self.resolve(conduction.method, conduction.options)
+        except EtcError as error:
+            return error
+        return None
+
+
+def _voxel_memory(lengths: Sequence[float], particles: float, options: Mapping[str, Any]) -> float:
+    counts = np.asarray(lengths) / min(lengths) * options["resolution"]
+    return PARTICLE_BYTES * particles + VOXEL_BYTES * float(np.prod(counts))
+
+
+def _lattice_memory(_: Sequence[float], particles: float, options: Mapping[str, Any]) -> float:
+    return PARTICLE_BYTES * particles + NODE_BYTES * options["particles"]
+
+
+def _elements(name: str, description: str, *options: str) -> Method:
+    """A method of thermal elements with a transient form."""
+    return Method(description, dimensions_of(name), transient=True, options=("angle_curve", "dipoles", *options))
+
+
+def _grid(description: str) -> Method:
+    """A method on voxels."""
+    options = ("resolution", "boundary", "solver", "green", "threads")
+    return Method(description, (2, 3), contacts=False, pores=MAY, options=options)
+
+
+def _nodes(description: str) -> Method:
+    """A method on a particle lattice."""
+    return Method(description, (3,), contacts=False, pores=MAY, options=("particles", "boundary"))
 
 
 ENGINES: Mapping[str, Engine] = {
-    "dtem": Engine(conduct_dtem, ("chord", *(name for name in DTEM_METHODS if name != "chord")), (2,)),
-    "pipe": Engine(conduct_pipe, ("chord", "uniform"), (2,)),
-    "lattice": Engine(conduct_lattice, ("laguerre", "contact"), (3,), composite=True),
-    "voxel": Engine(conduct_voxel, ("laminate", "binary"), (2, 3), composite=True),
+    engine.name: engine
+    for engine in (
+        Engine(
+            "dtem",
+            "discrete thermal elements: particles with resistances between all of their contacts",
+            {
+                "chord": _elements("chord", "contact chords, each exact for a far source"),
+                "standard": _elements("standard", "uniform flux over the contact arcs (Feng et al. 2008)"),
+                "enhanced": _elements("enhanced", "uniform flux with a tabulated correction (Feng et al. 2008)"),
+                "arc": _elements("arc", "flux over the contact arcs in modes", "modes"),
+                "exact": Method(
+                    "particles cut by their contacts; of disks with two-sided bounds",
+                    dimensions_of("exact"),
+                    options=("modes",),
+                ),
+            },
+            lambda media, conduction, _: dtem.solve_series(media, conduction),
+            {"modes": MODES, "angle_curve": ANGLE_CURVE, "dipoles": DIPOLES},
+            system=element_system,
+            recover=lambda _, __, solution, load: recover_field(solution, load),
+            remarks=dtem.accuracy_remarks,
+        ),
+        Engine(
+            "pipe",
+            "pipe network: particles at their mean temperatures, joined by the resistances of their contacts",
+            {
+                "chord": Method("resistance of a contact chord", (2, 3), transient=True),
+                "uniform": Method("resistance under uniform flux (Feng et al. 2009)", (2, 3), transient=True),
+            },
+            lambda media, conduction, _: pipe.solve_series(media, conduction),
+            system=pipe_system,
+            recover=pipe_field,
+        ),
+        Engine(
+            "lattice",
+            "particle lattice: the whole medium as nodes and links",
+            {
+                "laguerre": _nodes("facets of a Laguerre tessellation fitted to the spheres"),
+                "contact": _nodes("calibrated contact network (Haddad et al. 2021)"),
+            },
+            lattice.solve_series,
+            {"particles": Option("particles of the lattice, about", 10_000, whole_number(50)), "boundary": BOUNDARY},
+            memory=_lattice_memory,
+        ),
+        Engine(
+            "voxel",
+            "voxels: the whole medium on a regular grid, by FFT",
+            {
+                "laminate": _grid("a laminate in every voxel that an interface crosses"),
+                "binary": _grid("every voxel has the conductivity at its centre"),
+            },
+            lambda media, conduction, _: voxel.solve_series(media, conduction),
+            {
+                "resolution": Option("voxels along the shortest edge of the box", 64, whole_number(2)),
+                "boundary": BOUNDARY,
+                "solver": Option("iteration", "cg", word_of("cg", "eyre-milton")),
+                "green": GREEN,
+                "threads": Option("threads of the FFT", 1, whole_number(1)),
+            },
+            section=section_of,
+            memory=_voxel_memory,
+        ),
+    )
 }
 
 
-def realize(spec: RealizationSpec, rng: np.random.Generator) -> Realization:
-    """Pack once, then solve every contact angle and method on that packing.
+def find_engine(name: str) -> Engine:
+    """The engine of a name.
 
-    Failures of the packer or the solver are recorded in the cells, not raised.
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if name not in ENGINES:
+        raise InputError(f"unknown engine {name!r}: expected one of {', '.join(ENGINES)}")
+    return ENGINES[name]
+
+
+def effective_conductivity(
+    medium: Medium,
+    *,
+    engine: str = "dtem",
+    method: str | None = None,
+    axes: tuple[int, ...] | None = None,
+    tolerance: float = 1e-10,
+    seed: int = 1,
+    **options: Any,
+) -> EffectiveConductivity[Any]:
+    """Effective conductivity of a medium by any engine.
 
     Parameters
     ----------
-    spec : RealizationSpec
-    rng : numpy.random.Generator
-        The random stream of this realization; nothing else is random.
+    medium : Medium
+    engine, method : str
+        A name of `ENGINES`, and one of its methods; the engine's own default for the medium if none is given.
+    axes : tuple of int, optional
+        Load axes; all by default.
+    tolerance : float
+        Relative error of the conductivity left by the iterative solver.
+    seed : int
+        Of everything that the engine draws.
+    options
+        Options of the engine that the method heeds.
 
     Returns
     -------
-    Realization
+    EffectiveConductivity
+
+    Raises
+    ------
+    InputError, GeometryError, PackingError, ConvergenceError
+
+    Examples
+    --------
+    >>> from etc_engine import Box, Medium, ParticlePacking, Pores, bonded_contacts
+    >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
+    >>> round(effective_conductivity(Medium(disk, 2.0, bonded_contacts(disk, 0.1))).mean, 6)
+    0.859369
+    >>> round(effective_conductivity(Medium(disk, 2.0, pores=Pores(1.0)), engine="voxel", resolution=16).mean, 1)
+    1.7
     """
-    start = time.perf_counter()
-    try:
-        packing = pack(spec.packing, rng)
-    except PackingError as error:
-        failed = Cell(Status.PACKING_FAILED, str(error))
-        return Realization(0, np.nan, np.nan, time.perf_counter() - start, uniform_cells(spec, failed))
-    seconds = time.perf_counter() - start
-    return Realization(
-        packing.count,
-        packing.density,
-        solid_fraction(packing),
-        seconds,
-        ENGINES[spec.conduction.engine].conduct(packing, spec, rng),
-    )
+    row = find_engine(engine)
+    method = method or row.default_method(medium.dimension, medium.pores.conduct)
+    result = row.results([medium], Conduction(engine, method, options, tolerance, axes), seed)[0]
+    if isinstance(result, EtcError):
+        raise result
+    return result
+
+
+def field_along(
+    medium: Medium, result: EffectiveConductivity[Any], *, engine: str, method: str, axis: int = 0
+) -> ParticleField:
+    """Temperatures and heat flows of every particle and contact under the load along one axis.
+
+    Parameters
+    ----------
+    medium : Medium
+    result : EffectiveConductivity
+        Of the medium, by the engine and method.
+    engine, method : str
+    axis : int
+        One that was asked for.
+
+    Raises
+    ------
+    InputError
+        If the engine has no fields of particles, or the axis was not asked for.
+    """
+    row = find_engine(engine)
+    if row.recover is None:
+        raise InputError(f"engine {engine} has no temperatures of particles and contacts")
+    for solution in result.solutions:
+        if axis in solution.axes:
+            return row.recover(medium, method, solution, solution.axes.index(axis))
+    raise InputError(f"the conductivity along {AXES[axis]} was not asked for: there is no field of that load")

@@ -1,17 +1,18 @@
-"""What a realization leaves behind: a cell for every contact angle (or contrast) and method."""
+"""What a realization leaves behind: one outcome per medium and method."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.errors import ConvergenceError, EtcError
-from etc_engine.realization.specification import RealizationSpec
+from etc_engine.medium.conductances import mean_field_conductivity
+from etc_engine.medium.conduction import Result
+from etc_engine.medium.medium import Medium
+from etc_engine.packing.neighbors import neighbor_pairs
 
 
 class Status(IntEnum):
@@ -26,12 +27,12 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True)
-class Cell:
-    """The outcome for one contact angle (or contrast) and one method.
+class Outcome:
+    """What solving one medium by one method came to.
 
-    ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
+    ``conductivity`` has shape (d, d) [W/(m K)], None after a failure; components a walled box does not define are NaN.
     ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``model_error_estimate`` is
-    what the method is estimated to miss, where it tells: ``chord`` solved in full, ``exact`` by its bounds.
+    what the method is estimated to miss, where it has an estimate: ``chord`` solved in full, ``exact`` by its bounds.
     ``solved_by`` is ``full``, or ``reduced`` where the conductivity comes from the solutions at other
     contact angles, ``snapshots`` of them. ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each
     axis, of method ``exact`` only.
@@ -39,7 +40,7 @@ class Cell:
 
     status: Status
     message: str = ""
-    conductivity: NDArray[np.float64] = field(default_factory=lambda: np.full((2, 2), np.nan))
+    conductivity: NDArray[np.float64] | None = None
     contacts: int = 0
     wall_contacts: int = 0
     coordination: float = np.nan
@@ -54,33 +55,43 @@ class Cell:
     conductivity_bounds: tuple[tuple[float, float], ...] = ()
 
 
-Cells = tuple[tuple[Cell, ...], ...]
-
-
 @dataclass(frozen=True)
 class Realization:
-    """What one realization gave; ``cells[variant][method]`` in the order of the specification."""
+    """What one realization gave; ``cells`` in the order of the specification, methods running fastest."""
 
     particles: int
     density: float
     solid_fraction: float
     pack_seconds: float
-    cells: Cells
+    cells: tuple[Outcome, ...]
 
 
-def attempted(solve: Callable[[], Cell], dimension: int = 2) -> Cell:
-    """The cell that a solver makes, with the time it took; what it raises becomes the status and the message."""
-    start = time.perf_counter()
-    nowhere = np.full((dimension, dimension), np.nan)
-    try:
-        cell = solve()
-    except ConvergenceError as error:
-        return Cell(Status.NOT_CONVERGED, str(error), nowhere)
-    except EtcError as error:
-        return Cell(Status.ERROR, str(error), nowhere)
-    return replace(cell, solve_seconds=time.perf_counter() - start)
+TOUCHING = 1e-6
+"""Surfaces closer than this, in mean radii of the pair, count as a contact where there is no contact network."""
 
 
-def uniform_cells(spec: RealizationSpec, cell: Cell) -> Cells:
-    """The same outcome in every cell of a realization."""
-    return ((cell,) * len(spec.conduction.methods),) * spec.variants
+def outcome_of(medium: Medium, result: Result) -> Outcome:
+    """The outcome of a medium: its conductivity and its contacts, or the error as status and message."""
+    if isinstance(result, ConvergenceError):
+        return Outcome(Status.NOT_CONVERGED, str(result))
+    if isinstance(result, EtcError):
+        return Outcome(Status.ERROR, str(result))
+    missing, network = result.missing_axes, medium.network
+    contacts = neighbor_pairs(medium.packing, relative_gap=TOUCHING).count if network is None else network.count
+    return Outcome(
+        status=Status.NOT_PERCOLATING if missing else Status.OK,
+        message=f"no path of contacts along {missing}" if missing else "",
+        conductivity=result.tensor,
+        contacts=contacts,
+        wall_contacts=0 if network is None else network.walls.size,
+        coordination=2.0 * contacts / medium.packing.count if network is None else network.coordination,
+        unknowns=result.unknowns,
+        iterations=result.iterations,
+        relative_energy_error=result.relative_energy_error,
+        solve_seconds=result.seconds,
+        mean_field_conductivity=np.nan if network is None else mean_field_conductivity(medium),
+        model_error_estimate=result.model_error,
+        solved_by="reduced" if result.snapshots else "full",
+        snapshots=result.snapshots,
+        conductivity_bounds=() if result.bounds is None else tuple((float(k), float(m)) for k, m in result.bounds),
+    )

@@ -1,102 +1,74 @@
-"""Which method makes which system: one line a method."""
+"""The transient system of a medium by any engine that has one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import partial
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.storage import stored_areas
-from etc_engine.engines.dtem.transient import transient_system
-from etc_engine.engines.pipe.conductances import PIPE_RESISTANCES
-from etc_engine.engines.pipe.transient import pipe_transient
-from etc_engine.medium.network import ContactNetwork
+from etc_engine.errors import InputError
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.transient import ParticleSystem, Source
 from etc_engine.medium.walls import WallCondition
-from etc_engine.solvers.marching import HeatSystem
+from etc_engine.realization.engines import ENGINES, Engine, find_engine
 
 
-class ParticleSystem(Protocol):
-    """What a method gives: a system to march, and the particles' mean temperatures in it.
-
-    The heat rates of ``heat`` are those into the particles from the walls 0, 1, ... of the box, and from the sources.
-    """
-
-    @property
-    def heat(self) -> HeatSystem:
-        """The system of all unknowns."""
-
-    def initial(self, temperatures: ArrayLike | Callable[[NDArray[np.float64]], ArrayLike]) -> NDArray[np.float64]:
-        """Unknowns of particles of given temperatures."""
-
-    def particle_temperatures(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Mean temperatures of the particles out of all unknowns, shape (n,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Physics:
-    """What a study says about the particles, besides their contacts.
+def transient_system(
+    medium: Medium,
+    walls: Mapping[str, WallCondition],
+    *,
+    engine: str = "dtem",
+    method: str | None = None,
+    source: Source = 0.0,
+    capacities: NDArray[np.float64] | None = None,
+    **options: Any,
+) -> ParticleSystem:
+    """A medium ready to be marched in time, with the conditions at the walls of its box.
 
     Parameters
     ----------
-    conductivity, heat_capacity : float or ndarray, shape (n,) [W/(m K)], [J/(m3 K)]
-    contact_resistance : float [m K/W]
-    walls : mapping of str to WallCondition
-    source : callable
-        t -> heat set free in each particle, shape (n,) [W/m].
-    pipe_resistance : str
-        With ``pipe``.
-    dipoles : bool
-        With the discrete thermal elements.
+    medium : Medium
+        With contacts and heat capacities.
+    walls : mapping of str to condition
+        By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
+    engine, method : str
+        As in `etc_engine.realization.engines.effective_conductivity`.
+    source : float, array_like, shape (n,), or callable of t [W, in 2D W/m]
+        Heat set free in all particles, or in each.
+    capacities : ndarray, shape (n,), optional [J/K, in 2D J/(m K)]
+        Of the particles; rho c times what their contacts leave of them by default.
+    options
+        Such as ``dipoles``.
+
+    Raises
+    ------
+    InputError, GeometryError
+        Also if the method has no transient form.
+
+    Examples
+    --------
+    >>> from etc_engine import Box, Medium, ParticlePacking, bonded_contacts, march
+    >>> from etc_engine.medium.walls import FixedTemperature
+    >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0)))
+    >>> medium = Medium(disk, 1.0, bonded_contacts(disk, 0.2), heat_capacity=1.0)
+    >>> system = transient_system(medium, {"left": FixedTemperature(1.0)}, engine="pipe")
+    >>> *_, late = march(system.heat, system.initial(0.0), [0.0, 40.0], steps=200)
+    >>> system.particle_temperatures(late.temperatures).round(6)
+    array([1.])
     """
-
-    conductivity: ArrayLike
-    heat_capacity: ArrayLike
-    contact_resistance: float
-    walls: Mapping[str, WallCondition]
-    source: Callable[[float], NDArray[np.float64]]
-    pipe_resistance: str = "chord"
-    dipoles: bool = False
-
-
-def _pipe(network: ContactNetwork, physics: Physics) -> ParticleSystem:
-    return pipe_transient(
-        network,
-        physics.walls,
-        resistance=physics.pipe_resistance,
-        conductivity=physics.conductivity,
-        heat_capacity=physics.heat_capacity,
-        contact_resistance=physics.contact_resistance,
-        source=physics.source,
-    )
+    row = find_engine(engine)
+    method = method or row.default_method(medium.dimension, medium.pores.conduct)
+    row.check(medium, method)
+    if row.system is None or not row.methods[method].transient:
+        able = [name for name, other in row.methods.items() if other.transient]
+        others = [name for name, other in ENGINES.items() if _has_transients(other)]
+        cure = f"choose {', '.join(able)}" if able else f"use the engine {' or '.join(others)}"
+        raise InputError(f"method {method} of engine {engine} has no transient form: {cure}")
+    row.resolve(method, options)
+    return row.system(medium, walls, method=method, source=source, capacities=capacities, **options)
 
 
-def _elements(network: ContactNetwork, physics: Physics, *, method: str) -> ParticleSystem:
-    return transient_system(
-        network,
-        physics.walls,
-        method=method,
-        dipoles=physics.dipoles,
-        conductivity=physics.conductivity,
-        heat_capacity=physics.heat_capacity,
-        contact_resistance=physics.contact_resistance,
-        source=physics.source,
-    )
-
-
-def storing_area(network: ContactNetwork, method: str, physics: Physics) -> NDArray[np.float64]:
-    """Area in which a method stores heat, of each particle, shape (n,) [m2]."""
-    return stored_areas(network, PIPE_RESISTANCES[physics.pipe_resistance] if method == "pipe" else method)
-
-
-SYSTEMS: Mapping[str, Callable[[ContactNetwork, Physics], ParticleSystem]] = {
-    "pipe": _pipe,
-    "chord": partial(_elements, method="chord"),
-    "standard": partial(_elements, method="standard"),
-    "enhanced": partial(_elements, method="enhanced"),
-    "arc": partial(_elements, method="arc"),
-}
-"""The system of a contact network, by the word of its method."""
+def _has_transients(engine: Engine) -> bool:
+    return any(method.transient for method in engine.methods.values())

@@ -84,6 +84,29 @@ class SolveReport:
     smallest_ritz: float = np.nan
 
 
+@dataclass(frozen=True)
+class Limits:
+    """What ends a solve, besides its tolerance.
+
+    Parameters
+    ----------
+    balance_tolerance : float
+        Largest imbalance |w . r| relative to the energy.
+    max_iterations : int
+    spectral_floor : float, optional
+        A mu <= lambda_min(M^-1 K) that is known; the smaller of it and of half the smallest Ritz value counts.
+    """
+
+    balance_tolerance: float = 1e-6
+    max_iterations: int = 300
+    spectral_floor: float | None = None
+
+
+DEFAULT_LIMITS = Limits()
+NO_SOLVE = SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""The report of a system without unknowns."""
+
+
 def build_preconditioner(matrix: csr_matrix, exact_level: int = EXACT_LEVEL) -> Preconditioner:
     """Hierarchy for `solve_energy`: smoothed aggregation, or one factorised level if the matrix is small.
 
@@ -129,10 +152,8 @@ def solve_energy(
     preconditioner: Preconditioner | None = None,
     initial: NDArray[np.float64] | None = None,
     tolerance: float = 1e-10,
-    balance_tolerance: float = 1e-6,
-    max_iterations: int = 300,
     conserved: NDArray[np.float64] | None = None,
-    spectral_floor: float | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> tuple[NDArray[np.float64], SolveReport]:
     """Solve K u = b until the energy E = lift_energy - b . u is known to a relative tolerance.
 
@@ -148,15 +169,12 @@ def solve_energy(
     initial : ndarray, shape (n,), optional
         Starting guess, zero by default.
     tolerance : float
-        Stop when the estimate of |u - u_k|_K^2 is at most ``tolerance * E`` (E at least 1e-13 of the lift's) ...
-    balance_tolerance : float
-        ... and the imbalance |w . r| is at most ``balance_tolerance * E``; what is left of it is then taken away by
-        the Galerkin correction u + s w, which can only lower the energy error.
-    max_iterations : int
+        Stop when the estimate of |u - u_k|_K^2 is at most ``tolerance * E`` (E at least 1e-13 of the lift's) and the
+        imbalance |w . r| at most ``limits.balance_tolerance * E``; what is left of it is then taken away by the
+        Galerkin correction u + s w, which can only lower the energy error.
     conserved : ndarray, shape (n,), optional
         The vector w of a uniform temperature, all ones by default: w . r is heat that enters and does not leave.
-    spectral_floor : float, optional
-        A mu <= lambda_min(M^-1 K) that is known; the smaller of it and of half the smallest Ritz value counts.
+    limits : Limits
 
     Returns
     -------
@@ -213,7 +231,7 @@ def solve_energy(
 
     if rho == 0.0:
         return u, report(0.0, 0.0)
-    while len(steps) < max_iterations:
+    while len(steps) < limits.max_iterations:
         q = matrix @ p
         curvature = float(p @ q)
         if not (rho > 0.0 and curvature > 0.0):
@@ -228,33 +246,90 @@ def solve_energy(
         # E_lift - 2 b.u + u.K u, which holds for any iterate
         energy = max(lift_energy - float(u @ (rhs + r)), ROUND_OFF * lift_energy)
         ritz = smallest_ritz_value(steps, ratios)
-        mu = min(0.5 * ritz, np.inf if spectral_floor is None else spectral_floor)
+        mu = min(0.5 * ritz, np.inf if limits.spectral_floor is None else limits.spectral_floor)
         error = max(radau_factor(steps, ratios, mu) * rho_next, 0.0) / energy
         imbalance = abs(float(uniform @ r)) / energy
-        if error <= tolerance and imbalance <= balance_tolerance:
+        if error <= tolerance and imbalance <= limits.balance_tolerance:
             if imbalance > BALANCED:
                 imbalance = _balance(matrix, rhs, u, uniform) / energy
             return u, report(error, imbalance)
         rho = rho_next
         p *= ratios[-1]
         p += z
-    if len(steps) < max_iterations:
+    if len(steps) < limits.max_iterations:
         raise ConvergenceError(
             f"conjugate gradients broke down after {len(steps)} iterations: the matrix or its preconditioner is not "
             f"positive definite (relative residual {history[-1]:.2e})",
             history,
         )
     raise ConvergenceError(
-        f"conjugate gradients stopped after {max_iterations} iterations with relative energy error {error:.2e} "
-        f"(wanted {tolerance:.2e}) and flux imbalance {imbalance:.2e} (wanted {balance_tolerance:.2e})",
+        f"conjugate gradients stopped after {limits.max_iterations} iterations with relative energy error {error:.2e} "
+        f"(wanted {tolerance:.2e}) and flux imbalance {imbalance:.2e} (wanted {limits.balance_tolerance:.2e})",
         history,
     )
+
+
+def solve_loads(
+    matrix: csr_matrix,
+    rhs: NDArray[np.float64],
+    lift_energies: NDArray[np.float64],
+    *,
+    preconditioner: Preconditioner | None = None,
+    initial: NDArray[np.float64] | None = None,
+    tolerance: float = 1e-10,
+    conserved: NDArray[np.float64] | None = None,
+    limits: Limits = DEFAULT_LIMITS,
+) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
+    """Solve K u_a = b_a for all loads a of one matrix, with one preconditioner.
+
+    Parameters
+    ----------
+    matrix : csr_matrix, shape (n, n)
+        Symmetric positive definite; without rows there is nothing to solve.
+    rhs : ndarray, shape (n, k)
+    lift_energies : ndarray, shape (k,)
+        Energy of the prescribed part of each solution.
+    initial : ndarray, shape (n, k), optional
+        Starting guesses; a load without a right-hand side starts from zero.
+    preconditioner, tolerance, conserved, limits
+        As in `solve_energy`.
+
+    Returns
+    -------
+    u : ndarray, shape (n, k)
+    reports : tuple of SolveReport
+        One per load.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    if matrix.shape[0] == 0:
+        return np.zeros(rhs.shape), (NO_SOLVE,) * rhs.shape[1]
+    preconditioner = preconditioner or build_preconditioner(matrix)
+    u = np.empty(rhs.shape)
+    reports = []
+    for load, lift_energy in enumerate(lift_energies):
+        b = np.ascontiguousarray(rhs[:, load])
+        start = None if initial is None or not b.any() else np.ascontiguousarray(initial[:, load])
+        u[:, load], report = solve_energy(
+            matrix,
+            b,
+            float(lift_energy),
+            preconditioner=preconditioner,
+            initial=start,
+            tolerance=tolerance,
+            conserved=conserved,
+            limits=limits,
+        )
+        reports.append(report)
+    return u, tuple(reports)
 
 
 def _balance(
     matrix: csr_matrix, rhs: NDArray[np.float64], u: NDArray[np.float64], uniform: NDArray[np.float64]
 ) -> float:
-    """Shift u, in place, by the uniform temperature that balances the heat flows; answers what is left of w . r."""
+    """Shift u, in place, by the uniform temperature that balances the heat flows; returns what is left of w . r."""
     load = matrix @ uniform
     residual = rhs - matrix @ u
     shift = float(uniform @ residual) / float(uniform @ load)

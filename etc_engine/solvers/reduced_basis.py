@@ -26,7 +26,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix
 
 from etc_engine.errors import ConvergenceError
-from etc_engine.solvers.amg_cg import ROUND_OFF, Preconditioner, build_preconditioner, solve_energy
+from etc_engine.solvers.amg_cg import ROUND_OFF, Limits, Preconditioner, build_preconditioner, solve_loads
 
 # A snapshot that keeps less than this part of its norm beside the basis has nothing to add but round-off.
 DEPENDENT = 1e-11
@@ -299,19 +299,16 @@ def _full(
     preconditioner = build_preconditioner(matrix) if reference is None else reference.preconditioner
     flows = member.apply(space.lift)
     rhs = -space.gather(flows)
-    u, reports = np.empty(rhs.shape), []
-    for a in range(rhs.shape[1]):
-        u[:, a], report = solve_energy(
-            matrix,
-            np.ascontiguousarray(rhs[:, a]),
-            float(space.lift[:, a] @ flows[:, a]),
-            preconditioner=preconditioner,
-            initial=None if nearby is None or not rhs[:, a].any() else np.ascontiguousarray(nearby.u[:, a]),
-            tolerance=tolerance,
-            conserved=space.conserved,
-            spectral_floor=None if reference is None else reference.mu * member.floor(reference.member),
-        )
-        reports.append(report)
+    u, reports = solve_loads(
+        matrix,
+        rhs,
+        np.array([column @ flow for column, flow in zip(space.lift.T, flows.T, strict=True)]),
+        preconditioner=preconditioner,
+        initial=None if nearby is None else nearby.u,
+        tolerance=tolerance,
+        conserved=space.conserved,
+        limits=Limits(spectral_floor=None if reference is None else reference.mu * member.floor(reference.member)),
+    )
     if reference is None:
         # without iterations there is no Ritz value; that of a factorisation is 1
         ritz = [report.smallest_ritz for report in reports if report.iterations]

@@ -18,11 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 from scipy.sparse.csgraph import connected_components
 
-from etc_engine.engines.pipe.steady import pipe_conductivity
 from etc_engine.errors import InputError
-from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.medium import Medium
 from etc_engine.medium.walls import WALLS, FixedTemperature
-from etc_engine.realization.transients import SYSTEMS, Physics
+from etc_engine.realization import effective_conductivity, transient_system
 from etc_engine.solvers.marching import march
 
 TERMS = 200
@@ -138,12 +137,9 @@ class Diffusivity:
 
 
 def effective_diffusivity(
-    network: ContactNetwork,
+    medium: Medium,
     *,
-    resistance: str = "chord",
-    conductivity: ArrayLike = 1.0,
-    heat_capacity: ArrayLike = 1.0,
-    contact_resistance: float = 0.0,
+    method: str = "chord",
     heated: str = "left",
     tolerance: float = 1e-4,
 ) -> Diffusivity:
@@ -151,12 +147,10 @@ def effective_diffusivity(
 
     Parameters
     ----------
-    network : ContactNetwork
-        Walled along x.
-    resistance, conductivity, contact_resistance
-        As in `etc_engine.engines.pipe.conductances.pipe_conductances`.
-    heat_capacity : float or array_like, shape (n,) [J/(m3 K)]
-        rho c of all particles, or of each.
+    medium : Medium
+        Walled along x, with contacts and heat capacities.
+    method : str
+        As in `etc_engine.engines.pipe.steady.pipe_conductivity`.
     heated : str
         The wall of the step, ``left`` or ``right``. What is not homogeneous counts more near it: the two differ.
     tolerance : float
@@ -177,41 +171,29 @@ def effective_diffusivity(
 
     Examples
     --------
-    >>> from etc_engine import Box, ParticlePacking, bonded_contacts
+    >>> from etc_engine import Box, Medium, ParticlePacking, bonded_contacts
     >>> x = np.arange(40) + 0.5
     >>> row = ParticlePacking(np.stack([x, np.full(40, 0.5)], axis=1), np.full(40, 0.5), Box((40.0, 1.0)))
-    >>> found = effective_diffusivity(bonded_contacts(row, 0.1))
+    >>> found = effective_diffusivity(Medium(row, 1.0, bonded_contacts(row, 0.1), heat_capacity=1.0))
     >>> bool(abs(found.transient / found.steady - 1.0) < 2e-3)
     True
     """
-    box = network.packing.box
+    box, network = medium.box, medium.links
     if heated not in ("left", "right"):
         raise InputError(f"the heated wall is left or right, found {heated!r}")
     if box.periodic[0]:
         raise InputError("the diffusivity along x is measured between two walls; the box is periodic along x")
-    k = float(
-        pipe_conductivity(
-            network,
-            resistance=resistance,
-            conductivity=conductivity,
-            contact_resistance=contact_resistance,
-            axes=(0,),
-        ).tensor[0, 0]
-    )
+    k = float(effective_conductivity(medium, engine="pipe", method=method, axes=(0,)).tensor[0, 0])
     if k == 0.0:
         raise InputError("no path of contacts leads from wall to wall: there is no effective diffusivity")
-    zero = np.zeros(network.packing.count)
-    physics = Physics(
-        conductivity, heat_capacity, contact_resistance, {heated: FixedTemperature(1.0)}, lambda _: zero, resistance
-    )
-    system = SYSTEMS["pipe"](network, physics)
-    labels = connected_components(system.heat.conductance, directed=False)[1]
+    system = transient_system(medium, {heated: FixedTemperature(1.0)}, engine="pipe", method=method)
+    labels = system.state_temperatures(connected_components(system.heat.conductance, directed=False)[1])[:, 0]
     joined = np.isin(labels, labels[network.wall_particles[network.walls == WALLS.index(heated)]])
-    shares = np.where(joined, system.heat.capacity, 0.0)
-    density = float(shares.sum() / box.volume)
-    scale = box.lengths[0] ** 2 * density / k
+    shares = np.where(joined, system.capacities, 0.0)
+    heat_capacity = float(shares.sum() / box.volume)
+    scale = box.lengths[0] ** 2 * heat_capacity / k
     times = scale * np.concatenate([[0.0], np.geomspace(3e-3, 2.0, 60)])
     states = march(system.heat, system.initial(0.0), times, scheme="adaptive", tolerance=tolerance)
-    means = np.array([shares @ state.temperatures for state in states]) / shares.sum()
+    means = np.array([shares @ system.particle_temperatures(state.temperatures) for state in states]) / shares.sum()
     alpha, misfit = fit_diffusivity(times, means, box.lengths[0])
-    return Diffusivity(alpha, misfit, k / density, k, density, times, means)
+    return Diffusivity(alpha, misfit, k / heat_capacity, k, heat_capacity, times, means)

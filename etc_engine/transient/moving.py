@@ -19,19 +19,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from etc_engine.engines.dtem.steady import per_particle
 from etc_engine.errors import EtcError, InputError
+from etc_engine.medium.medium import per_particle
 from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.transient import ParticleSystem
 from etc_engine.packing.particles import ParticlePacking, particle_values
 from etc_engine.particle_files.trajectory import Trajectory
-from etc_engine.realization.transients import ParticleSystem
 from etc_engine.solvers.marching import march
 
 Build = Callable[[ContactNetwork, NDArray[np.float64]], ParticleSystem]
 """(network, heat capacity of each particle [J/(m K)]) -> system; walls, materials and sources are the builder's.
-
-The functions that make systems take rho c and multiply with the area that a method stores heat in, so a builder hands
-them ``capacities / stored_areas(network, method)``.
 """
 
 
@@ -193,12 +190,12 @@ def march_trajectory(
 
     >>> from etc_engine import Box
     >>> from etc_engine.medium.rules import overlap_contacts
-    >>> from etc_engine.engines.dtem.storage import stored_areas
-    >>> from etc_engine.engines.pipe.transient import pipe_transient
+    >>> from etc_engine.engines.pipe.transient import pipe_system
+    >>> from etc_engine.medium.medium import Medium
     >>> box = Box((4.0, 1.0))
     >>> disks = [ParticlePacking([[1.0, 0.5], [x, 0.5]], [0.3, 0.3], box) for x in (1.55, 2.5, 2.5)]
     >>> def pipes(network, capacities):
-    ...     return pipe_transient(network, {}, heat_capacity=capacities / stored_areas(network, "chord"))
+    ...     return pipe_system(Medium(network.packing, 1.0, network), {}, capacities=capacities)
     >>> states = list(march_trajectory(Trajectory([0.0, 0.1, 9.0], disks), overlap_contacts, pipes, [1.0, 0.0]))
     >>> [state.contacts for state in states], bool(states[1].temperatures[1] > 0.1)
     ([1, 0, 0], True)

@@ -26,9 +26,10 @@ from etc_engine import (
     parse_radii,
     read_csv,
 )
-from etc_engine.engines.dtem.effective import conductivity_bounds
+from etc_engine.engines.dtem.conductivity import conductivity_bounds
 from etc_engine.engines.dtem.model_error import chord_error_estimate, chord_error_terms
 from etc_engine.errors import GeometryError
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
 
 HERE = Path(__file__).parent
@@ -103,8 +104,8 @@ def cases() -> Iterator[Case]:
 def evaluate(case: Case) -> dict[str, object] | None:
     """Errors of all methods, the terms and the estimate for ``chord``; None where contacts leave no free arc."""
     try:
-        exact = effective_conductivity(case.network, method="exact", modes=MODES, axes=(0,))
-        others = {m: effective_conductivity(case.network, method=m, axes=(0,)) for m in METHODS}
+        exact = effective_conductivity(medium_of(case.network), method="exact", modes=MODES, axes=(0,))
+        others = {m: effective_conductivity(medium_of(case.network), method=m, axes=(0,)) for m in METHODS}
     except GeometryError:
         return None
     value, (low, high) = exact.tensor[0, 0], conductivity_bounds(exact)[0]
@@ -211,7 +212,7 @@ def bounds(output: Path) -> None:
     for (name, network), marker in zip(networks.items(), "osD^v", strict=True):
         pairs = []
         for m in modes:
-            result = effective_conductivity(network, method="exact", modes=m, axes=(0,))
+            result = effective_conductivity(medium_of(network), method="exact", modes=m, axes=(0,))
             low, high = conductivity_bounds(result)[0]
             pairs.append((low, high))
             rows.append([name, m, f"{low:.10f}", f"{high:.10f}", high / low - 1.0])

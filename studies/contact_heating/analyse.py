@@ -14,14 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine import Box, ContactNetwork, PackingSpec, bonded_contacts, pack, parse_radii
-from etc_engine.engines.dtem.transient import contact_flows, particle_sides, transient_system
+from etc_engine.engines.dtem.transient import contact_temperatures
 from etc_engine.engines.meshless import ContactArc, heat_disk_by_flows
-from etc_engine.engines.pipe.flows import pipe_contact_flows
-from etc_engine.engines.pipe.transient import pipe_transient
-from etc_engine.laws.disk import standard_resistance
+from etc_engine.laws.disk import position_angles, standard_resistance
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.sides import contact_sides
+from etc_engine.medium.transient import ParticleSystem, particle_sides
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import march
 
 HERE = Path(__file__).parent
@@ -70,27 +71,27 @@ def chosen(network: ContactNetwork) -> dict[str, int]:
     }
 
 
-def marched(network: ContactNetwork, model: str, unit: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def made_system(network: ContactNetwork, model: str) -> ParticleSystem:
+    """The system of one of the models."""
+    medium = medium_of(network, heat_capacity=1.0)
+    if model.startswith("pipe"):
+        return transient_system(medium, WALLS, engine="pipe", method="uniform")
+    return transient_system(medium, WALLS, method="standard", dipoles="dipoles" in model)
+
+
+def marched(system: ParticleSystem, model: str, unit: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Times (m,), heat flows (m, s) and temperatures (m, s) at all contact sides, means (m, n)."""
     times = np.concatenate([[0.0], np.geomspace(1e-4, FOURIER[-1], 160)]) * unit
-    everything = contact_sides(network)
-    own = standard_resistance(everything.alpha)
-    pipes = model.startswith("pipe")
-    system = (
-        pipe_transient(network, WALLS, resistance="uniform")
-        if pipes
-        else transient_system(network, WALLS, method="standard", dipoles="dipoles" in model)
-    )
+    sides = system.sides
+    own = standard_resistance(sides.alpha)
     flows, contacts, means = [], [], []
     for state in march(system.heat, system.initial(0.0), times, scheme="adaptive", tolerance=1e-6):
         mean = system.particle_temperatures(state.temperatures)
-        if pipes:
-            walls = system.wall_temperatures(state.time, state.temperatures)
-            flow = pipe_contact_flows(network, everything, mean, walls, resistance="uniform")
-            contact = mean[everything.particles] + own * flow
+        flow = system.flows(state.time, state.temperatures)
+        if model.startswith("pipe"):
+            contact = mean[sides.particles] + own * flow
         else:
-            flow = contact_flows(system, state.time, state.temperatures)
-            contact = system.contact_temperatures(state.time, state.temperatures)[system.sides.nodes]
+            contact = contact_temperatures(system, state.time, state.temperatures)[sides.nodes]
         flows.append(flow)
         contacts.append(contact)
         means.append(mean)
@@ -101,14 +102,11 @@ def inside(network: ContactNetwork, model: str, particle: int, steps: int = 200)
     """March the network, then the inside of one particle under its fluxes."""
     radius = float(network.packing.radii[particle])
     unit = radius**2
-    times, flows, contacts, means = marched(network, model, unit)
-    kept = network if model.startswith("pipe") else network.select(np.ones(network.count, bool), network.walls == 0)
-    sides = contact_sides(kept)
-    system = transient_system(network, WALLS, method="standard")
-    rows = particle_sides(system, particle)
-    if model.startswith("pipe"):
-        rows = slice(int(sides.offsets[particle]), int(sides.offsets[particle + 1]))
-    arcs = [ContactArc(float(t), float(a)) for t, a in zip(sides.theta[rows], sides.alpha[rows], strict=True)]
+    system = made_system(network, model)
+    times, flows, contacts, means = marched(system, model, unit)
+    sides, rows = system.sides, particle_sides(system, particle)
+    theta = position_angles(sides.arms[rows])
+    arcs = [ContactArc(float(t), float(a)) for t, a in zip(theta, sides.alpha[rows], strict=True)]
     truth = heat_disk_by_flows(arcs, times, flows[:, rows], FOURIER * unit, radius=radius, steps=steps)
 
     def at_outputs(values: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, pack, parse_radii
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import coordination_contacts
 from etc_engine.transient.diffusivity import WINDOW, Diffusivity, effective_diffusivity, slab_mean
 
@@ -33,7 +34,9 @@ def measure(count: int, number: int) -> Pair:
     box = Box((1.0, 1.0), (False, True))
     spec = PackingSpec("lubachevsky-stillinger", parse_radii("uniform:1:2"), box, count=count, density=DENSITY)
     network = coordination_contacts(pack(spec, rng), np.radians(HALF_ANGLE), COORDINATION)
-    return effective_diffusivity(network, heated="left"), effective_diffusivity(network, heated="right")
+    return effective_diffusivity(medium_of(network, heat_capacity=1.0), heated="left"), effective_diffusivity(
+        medium_of(network, heat_capacity=1.0), heated="right"
+    )
 
 
 def run(largest: int, disks: int) -> dict[int, list[Pair]]:

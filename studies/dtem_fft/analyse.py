@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, ParticlePacking, effective_conductivity, overlap_contacts, pack, parse_radii
-from etc_engine.engines.dtem.effective import conductivity_bounds
-from etc_engine.engines.voxel import solve_cell, voxelize
-from etc_engine.medium.composite import Composite
+from etc_engine.engines.dtem.conductivity import conductivity_bounds
+from etc_engine.engines.voxel import Scheme, solve_cell, voxelize
+from etc_engine.medium.medium import Medium, Pores, medium_of
 from etc_engine.medium.network import ContactNetwork
 
 HERE = Path(__file__).parent
@@ -48,10 +48,10 @@ def square_array() -> ParticlePacking:
 def elements(network: ContactNetwork) -> dict[str, float]:
     """Conductivity along x by the methods of the DTEM, and the bounds of ``exact``."""
     found = {
-        name: float(effective_conductivity(network, method=name).tensor[0, 0])
+        name: float(effective_conductivity(medium_of(network), method=name).tensor[0, 0])
         for name in ("standard", "enhanced", "chord")
     }
-    exact = effective_conductivity(network, method="exact", modes=5)
+    exact = effective_conductivity(medium_of(network), method="exact", modes=5)
     low, high = conductivity_bounds(exact)[0]
     return found | {"exact": float(exact.tensor[0, 0]), "lower bound": float(low), "upper bound": float(high)}
 
@@ -59,12 +59,12 @@ def elements(network: ContactNetwork) -> dict[str, float]:
 def grids(name: str, packing: ParticlePacking, largest: int, exact: float) -> list[dict[str, float | str]]:
     """Conductivity along x on grids, with the width of a contact and the gaps they bridge in voxels."""
     rows = []
-    composite = Composite(packing, 0.0, 1.0)
+    composite = Medium(packing, 1.0, pores=Pores(0.0))
     for kind in KINDS:
         for n in (n for n in RESOLUTIONS if n <= largest):
             start = time.perf_counter()
             image = voxelize(composite, n, kind)
-            solved = solve_cell(image.conductivity, (1.0, 1.0), tolerance=1e-6, axes=(0,), limit=20_000)
+            solved = solve_cell(image.conductivity, (1.0, 1.0), axes=(0,), scheme=Scheme(tolerance=1e-6, limit=20_000))
             rows.append(
                 {
                     "geometry": name,
@@ -92,7 +92,7 @@ def draw_contact(axes, packing: ParticlePacking, network: ContactNetwork, n: int
     radius = packing.radii[i]
     branch = network.branches[at]
     middle = packing.centers[i] + branch / np.hypot(*branch) * radius * np.cos(network.angles[at, 0])
-    image = voxelize(Composite(packing, 0.0, 1.0), n, "binary").conductivity.scalars
+    image = voxelize(Medium(packing, 1.0, pores=Pores(0.0)), n, "binary").conductivity.scalars
     tiled = np.tile(image, (3, 3))
     reach = 0.55 * radius
     axes.imshow(tiled.T, origin="lower", extent=(-1, 2, -1, 2), cmap="Blues", vmin=0.0, vmax=2.2, interpolation="none")

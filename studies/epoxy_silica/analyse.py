@@ -18,12 +18,13 @@ from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, ParticlePacking, pack, parse_radii
 from etc_engine.engines.lattice.flux import probe
-from etc_engine.engines.lattice.homogenize import composite_lattice, homogenize_lattice, node_conductivities
+from etc_engine.engines.lattice.homogenize import homogenize_lattice, medium_lattice, node_conductivities
 from etc_engine.engines.lattice.network import link_conductances
 from etc_engine.engines.lattice.steady import solve_between_walls
 from etc_engine.engines.voxel import homogenize_voxel, solve_cell, voxelize
 from etc_engine.engines.voxel.section import sample, temperature_between_walls
-from etc_engine.medium.composite import Composite
+from etc_engine.medium.medium import Medium, Pores
+from etc_engine.medium.phases import find_owners
 from etc_engine.models.catalogue import find_model
 
 HERE = Path(__file__).parent
@@ -43,13 +44,13 @@ POINTS = {"A": (0.5, 0.6, 0.6), "B": (0.5, 0.02, 0.5), "C": (0.5, 0.3, 0.55), "D
 COLD, HOT = 25.0, 35.0
 
 
-def cell(fraction: float, realization: int) -> Composite:
+def cell(fraction: float, realization: int) -> Medium:
     """Spheres of a sixth of the edge, their number that of the fraction, in a periodic cube."""
     count = round(fraction * DIAMETERS**3 * 6.0 / np.pi)
     box = Box((EDGE,) * 3, (True,) * 3)
     spec = PackingSpec("lubachevsky-stillinger", parse_radii("equal"), box, count, fraction)
     rng = np.random.default_rng([SEED, round(1000 * fraction), realization])
-    return Composite(pack(spec, rng), EPOXY, np.array(SILICA))
+    return Medium(pack(spec, rng), np.array(SILICA), pores=Pores(EPOXY))
 
 
 def model(name: str, fraction) -> np.ndarray:
@@ -63,15 +64,15 @@ def sweep(realizations: int, shared: int, resolution: int, particles: int) -> xr
     for i, fraction in enumerate(FRACTIONS):
         for r in range(realizations):
             composite = cell(fraction, r)
-            k["spheres"][i, r] = composite.inclusions.count
+            k["spheres"][i, r] = composite.packing.count
             fft = homogenize_voxel(composite, resolution=resolution)
-            k["voxel"][i, r], k["voxel_error"][i, r] = np.trace(fft.tensor) / 3.0, fft.relative_error_estimate
+            k["voxel"][i, r], k["voxel_error"][i, r] = np.trace(fft.tensor) / 3.0, fft.model_error
             words = f"f = {fraction:.1f} cell {r}: FFT {k['voxel'][i, r]:.6f} ({fft.seconds:.1f} s)"
             if r < shared:
                 rng = np.random.default_rng([SEED, i, r])
                 lattice = homogenize_lattice(composite, particles=particles, rng=rng)
                 k["lattice"][i, r] = np.trace(lattice.tensor) / 3.0
-                k["lattice_error"][i, r] = lattice.relative_error_estimate
+                k["lattice_error"][i, r] = lattice.model_error
                 difference = 100.0 * (k["lattice"][i, r] / k["voxel"][i, r] - 1.0)
                 words += f", lattice {k['lattice'][i, r]:.6f} ({lattice.seconds:.1f} s), {difference:+.3f} %"
             print(words, flush=True)
@@ -135,7 +136,7 @@ def compare_points(resolution: int, particles: int) -> list[dict[str, float | st
     """Temperature and heat flux at four points by both engines: one cell of 20 % between walls along y."""
     periodic = cell(0.2, 0)
     walled = ParticlePacking(periodic.inclusions.centers, periodic.inclusions.radii, Box((EDGE,) * 3))
-    composite = Composite(walled, EPOXY, np.array(SILICA))
+    composite = Medium(walled, np.array(SILICA), pores=Pores(EPOXY))
     points = EDGE * np.array(list(POINTS.values()))
     gradient = (HOT - COLD) / EDGE
     start = time.perf_counter()
@@ -146,7 +147,7 @@ def compare_points(resolution: int, particles: int) -> list[dict[str, float | st
     field = gradient * image.conductivity.apply(unit)
     flux = np.sqrt(sum(sample(part, points, (EDGE,) * 3) ** 2 for part in field))
     seconds = time.perf_counter() - start
-    made = composite_lattice(composite, particles, np.random.default_rng([SEED, 77]), boundary="walls")
+    made = medium_lattice(composite, particles, np.random.default_rng([SEED, 77]), boundary="walls")
     k = node_conductivities(composite, made.owner)
     links = link_conductances(made.lattice, k)
     steady = solve_between_walls(made.lattice, links, 1, temperatures=(COLD, HOT))
@@ -154,7 +155,7 @@ def compare_points(resolution: int, particles: int) -> list[dict[str, float | st
     lattice_flux = np.linalg.norm(vectors, axis=1)
     effective = steady.energy / (HOT - COLD) ** 2 / EDGE
     print(f"walls: FFT k_yy = {solved.tensor[1, 1]:.6f} ({seconds:.0f} s), lattice {effective:.6f} W/(m K)")
-    phases = composite.phase(points)
+    phases = find_owners(composite.packing, points)
     return [
         {
             "point": name,

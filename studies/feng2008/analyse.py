@@ -22,9 +22,10 @@ from etc_engine import (
     pack,
     parse_radii,
     read_csv,
-    recover_field,
 )
+from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.methods import METHODS
+from etc_engine.medium.medium import medium_of
 from etc_engine.output.figures import save_field
 
 HERE = Path(__file__).parent
@@ -37,7 +38,7 @@ PAPER = {"standard": 0.2678, "enhanced": 0.2757}
 def tables(output: Path) -> None:
     """Tables 3 and 4 with a column for every method, and the converged truth."""
     network = overlap_contacts(read_csv(HERE / "particles.csv", Box((1.0, 1.0))).packing)
-    results = {method: effective_conductivity(network, method=method, axes=(0,)) for method in METHODS}
+    results = {method: effective_conductivity(medium_of(network), method=method, axes=(0,)) for method in METHODS}
     with (output / "table3.csv").open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["method", "kappa_hat", "error_percent", "paper"])
@@ -60,7 +61,7 @@ def tables(output: Path) -> None:
             writer.writerow([zone + 1, f"{i + 1}-{j + 1}", *row, *paper])
     solution = results["chord"].solutions[0]
     caption = f"12 particles, method chord: k = {results['chord'].tensor[0, 0]:.6f} W/(m K)"
-    save_field(output / "example1.png", solution, recover_field(solution), caption)
+    save_field(output / "example1.png", recover_field(solution), caption)
     draw_errors(output / "errors.png", published["converged_truth"], temperatures)
 
 
@@ -82,12 +83,12 @@ def second_example(output: Path) -> str:
     spec = PackingSpec("advancing-front", parse_radii("uniform:0.01:0.02"), Box((1.0, 1.0)))
     packing = pack(spec, np.random.default_rng(SEED))
     network = bonded_contacts(packing, np.radians(5.0))
-    result = effective_conductivity(network, axes=(0,))
+    result = effective_conductivity(medium_of(network), axes=(0,))
     text = (
         f"{packing.count} particles, {network.count} contacts, coordination {network.coordination:.3f}, "
         f"{result.unknowns} unknowns: k = {result.tensor[0, 0]:.5f} W/(m K)"
     )
-    save_field(output / "example2.png", result.solutions[0], recover_field(result.solutions[0]), text)
+    save_field(output / "example2.png", recover_field(result.solutions[0]), text)
     return text
 
 

@@ -24,7 +24,9 @@ from etc_engine import (
     parse_radii,
     read_csv,
 )
+from etc_engine.engines.dtem.conductivity import element_conductivity
 from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
 
 HERE = Path(__file__).parent
@@ -40,19 +42,20 @@ MODES = 3
 def conductivity(network: ContactNetwork, method: str) -> float:
     """Mean of the conductivities along both axes."""
     if method.startswith("pipe"):
-        tensor = pipe_conductivity(network, resistance=method.split(", ")[1]).tensor
+        tensor = pipe_conductivity(medium_of(network), method=method.split(", ")[1]).tensor
     else:
         modes = {"modes": MODES} if method == "exact" else {}
-        tensor = effective_conductivity(network, method=method, **modes).tensor
+        tensor = element_conductivity(medium_of(network), method=method, **modes).tensor
     return float(np.mean(np.diag(tensor)))
 
 
 def assembly(output: Path) -> None:
     """The 12-particle assembly along x, walls left and right."""
     network = overlap_contacts(read_csv(HERE.parent / "feng2008" / "particles.csv", Box((1.0, 1.0))).packing)
-    values = {f"pipe, {r}": pipe_conductivity(network, resistance=r, axes=(0,)) for r in ("uniform", "chord")}
+    values = {f"pipe, {r}": pipe_conductivity(medium_of(network), method=r, axes=(0,)) for r in ("uniform", "chord")}
     values |= {
-        method: effective_conductivity(network, method=method, axes=(0,)) for method in ("standard", "chord", "exact")
+        method: effective_conductivity(medium_of(network), method=method, axes=(0,))
+        for method in ("standard", "chord", "exact")
     }
     with (output / "assembly.csv").open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")

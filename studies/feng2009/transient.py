@@ -13,20 +13,26 @@ from pathlib import Path
 
 import numpy as np
 
-from etc_engine.engines.dtem.transient import transient_system
-from etc_engine.engines.pipe.transient import pipe_transient
+from etc_engine.medium.medium import medium_of
 from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import march
 
 sys.path.insert(0, str(Path(__file__).parent))
 from cases import CASES, HERE, Case
 
 MODELS: dict[str, Callable[[Case], object]] = {
-    "chord with dipoles": lambda c: transient_system(c.network(), c.conditions, method="chord", dipoles=True),
-    "chord": lambda c: transient_system(c.network(), c.conditions, method="chord"),
-    "standard": lambda c: transient_system(c.network(), c.conditions, method="standard"),
-    "pipe, chord": lambda c: pipe_transient(c.network(), c.conditions, resistance="chord"),
-    "pipe, uniform": lambda c: pipe_transient(c.network(), c.conditions, resistance="uniform"),
+    "chord with dipoles": lambda c: transient_system(
+        medium_of(c.network(), heat_capacity=1.0), c.conditions, method="chord", dipoles=True
+    ),
+    "chord": lambda c: transient_system(medium_of(c.network(), heat_capacity=1.0), c.conditions, method="chord"),
+    "standard": lambda c: transient_system(medium_of(c.network(), heat_capacity=1.0), c.conditions, method="standard"),
+    "pipe, chord": lambda c: transient_system(
+        medium_of(c.network(), heat_capacity=1.0), c.conditions, engine="pipe", method="chord"
+    ),
+    "pipe, uniform": lambda c: transient_system(
+        medium_of(c.network(), heat_capacity=1.0), c.conditions, engine="pipe", method="uniform"
+    ),
 }
 ROWS = (0.0178, 0.1, 0.316, 1.0, 3.16, 10.0, 31.6, 100.0)
 

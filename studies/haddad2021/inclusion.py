@@ -15,10 +15,10 @@ import numpy as np
 
 from etc_engine.box import Box
 from etc_engine.engines.lattice.flux import probe
-from etc_engine.engines.lattice.homogenize import composite_lattice, node_conductivities
+from etc_engine.engines.lattice.homogenize import medium_lattice, node_conductivities
 from etc_engine.engines.lattice.network import link_conductances
 from etc_engine.engines.lattice.steady import conductivity_tensor, solve_between_walls
-from etc_engine.medium.composite import Composite
+from etc_engine.medium.medium import Medium, Pores
 from etc_engine.models.arrays import simple_cubic
 from etc_engine.output.figures import save
 from etc_engine.output.figures.lattice import draw_inclusion
@@ -34,16 +34,16 @@ EXACT = {"temperature": (30.0, 30.0, 33.5111), "flux": (7767.43, 2309.24, 6433.6
 PUBLISHED = {"temperature": (30.0, 30.0, 33.5), "flux": (7796.0, 2370.0, 6183.0)}  # 150 000 particles
 
 
-def composite(contrast: float, matrix: float = 1.0) -> Composite:
+def composite(contrast: float, matrix: float = 1.0) -> Medium:
     """The inclusion in its box."""
     sphere = ParticlePacking([[0.5 * LENGTH] * 3], [LENGTH / 3.0], Box((LENGTH,) * 3))
-    return Composite(sphere, matrix, contrast * matrix)
+    return Medium(sphere, contrast * matrix, pores=Pores(matrix))
 
 
 def conduct(particles: int, transmission: str) -> tuple[int, np.ndarray]:
     """Nodes, and the mean conductivity along the axes at every contrast, on one lattice."""
     rng = np.random.default_rng([SEED, particles])
-    made = composite_lattice(composite(2.0), particles, rng, boundary="walls", transmission=transmission)
+    made = medium_lattice(composite(2.0), particles, rng, boundary="walls", transmission=transmission)
     bare = conductivity_tensor(made.lattice, link_conductances(made.lattice)).tensor if transmission == "contact" else 1
     found = []
     for contrast in CONTRASTS:
@@ -56,7 +56,7 @@ def conduct(particles: int, transmission: str) -> tuple[int, np.ndarray]:
 def fields(particles: int) -> tuple[np.ndarray, np.ndarray]:
     """Temperatures and sizes of the heat flux at the points of Table 2, on the fitted lattice."""
     body = composite(INCLUSION / MATRIX, MATRIX)
-    made = composite_lattice(body, particles, np.random.default_rng([SEED, particles]), boundary="walls")
+    made = medium_lattice(body, particles, np.random.default_rng([SEED, particles]), boundary="walls")
     k = node_conductivities(body, made.owner)
     field = solve_between_walls(made.lattice, link_conductances(made.lattice, k), 1, temperatures=(25.0, 35.0))
     temperatures, fluxes = probe(field, POINTS, k)

@@ -14,13 +14,14 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from etc_engine import effective_conductivity
-from etc_engine.engines.dtem.storage import stored_areas
 from etc_engine.engines.pipe.steady import pipe_conductivity
-from etc_engine.engines.pipe.transient import PipeTransient, pipe_transient
+from etc_engine.engines.pipe.transient import PipeTransient
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.particle_files.trajectory import Trajectory
+from etc_engine.realization import transient_system
 from etc_engine.transient.moving import MovingState, march_trajectory
 
 WALLS = {"bottom": FixedTemperature(1.0), "top": FixedTemperature(0.0)}
@@ -31,7 +32,11 @@ SHOWN = (0.0, 4.0, 24.0)
 
 
 def pipes(network: ContactNetwork, capacities: np.ndarray) -> PipeTransient:
-    return pipe_transient(network, WALLS, heat_capacity=capacities / stored_areas(network, "chord"))
+    return transient_system(
+        medium_of(network, heat_capacity=capacities / network.cut_measures(prescribed=True)),
+        WALLS,
+        engine="pipe",
+    )
 
 
 def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:
@@ -40,7 +45,7 @@ def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:
     radius = float(bed.packings[0].radii.mean())
     rate = peclet / radius**2  # kappa = rho c = 1
     network = overlap_contacts(bed.packings[0])
-    rest = pipe_conductivity(network, axes=(1,)).solutions[0].temperatures[:, 0]
+    rest = pipe_conductivity(medium_of(network), axes=(1,)).solutions[0].temperatures[:, 0]
     start = np.where(np.isnan(rest), 1.0 - bed.packings[0].centers[:, 1] / height, rest)
     timed = Trajectory(bed.times / rate, bed.packings, bed.ids)
     return list(march_trajectory(timed, overlap_contacts, pipes, start, steps=2))
@@ -60,8 +65,8 @@ def main(picture: str = "figure.png") -> None:
     bed = sheared_bed()
     late = [packing for time, packing in zip(bed.times, bed.packings, strict=True) if time > SETTLED][::8]
     networks = [overlap_contacts(packing) for packing in late]
-    still = np.array([pipe_conductivity(network, axes=(1,)).tensor[1, 1] for network in networks])
-    element = np.array([effective_conductivity(network, axes=(1,)).tensor[1, 1] for network in networks])
+    still = np.array([pipe_conductivity(medium_of(network), axes=(1,)).tensor[1, 1] for network in networks])
+    element = np.array([effective_conductivity(medium_of(network), axes=(1,)).tensor[1, 1] for network in networks])
     print(
         f"{bed.count} disks, {len(bed.packings)} frames, coordination {np.mean([n.coordination for n in networks]):.2f}"
     )

@@ -18,6 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from etc_engine import Box, ParticlePacking, effective_conductivity, overlap_contacts, read_csv
+from etc_engine.medium.medium import medium_of
 
 PARTICLES = Path(__file__).parents[2] / "studies" / "feng2008" / "particles.csv"
 MODES = range(1, 7)
@@ -78,7 +79,7 @@ def meshes() -> Iterator[tuple[str, float, float, float]]:
 def compare(output: Path | None) -> None:
     packing = read_csv(PARTICLES, Box((1.0, 1.0))).packing
     network = overlap_contacts(packing)
-    truth = effective_conductivity(network, method="exact", modes=9, axes=(0,)).tensor[0, 0]
+    truth = effective_conductivity(medium_of(network), method="exact", modes=9, axes=(0,)).tensor[0, 0]
     print(f"12 particles; truth {truth:.9f}, method exact with 9 modes")
     print(f"{'':22s}{'unknowns':>10s}{'seconds':>10s}{'error':>11s}")
     rows: list[tuple[str, int, float, float]] = []
@@ -86,7 +87,7 @@ def compare(output: Path | None) -> None:
         seconds = np.inf
         for _ in range(5):
             start = time.perf_counter()
-            result = effective_conductivity(network, method="exact", modes=modes, axes=(0,))
+            result = effective_conductivity(medium_of(network), method="exact", modes=modes, axes=(0,))
             seconds = min(seconds, time.perf_counter() - start)
         error = result.tensor[0, 0] / truth - 1.0
         rows.append(("exact", result.unknowns, seconds, error))
@@ -140,7 +141,7 @@ def scale(largest: int) -> None:
         network = overlap_contacts(packing)
         for modes in (1, 3):
             start = time.perf_counter()
-            result = effective_conductivity(network, method="exact", modes=modes, axes=(0,))
+            result = effective_conductivity(medium_of(network), method="exact", modes=modes, axes=(0,))
             seconds = time.perf_counter() - start
             print(
                 f"{side**2:8d}{modes:7d}{result.unknowns:10d}{seconds:10.2f}{1e3 * seconds / side**2:9.2f}"

@@ -15,9 +15,8 @@ from scipy.sparse.linalg import spsolve
 
 from etc_engine import Box, PackingSpec, bonded_contacts, find_backbone, pack, parse_radii
 from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.methods import METHODS
-from etc_engine.engines.dtem.steady import prescribe
+from etc_engine.medium.loads import contact_lift
 from etc_engine.medium.sides import contact_sides
 from etc_engine.solvers import build_preconditioner, solve_energy
 
@@ -42,9 +41,8 @@ def main() -> None:
             break
         reduced = network.select(backbone.contacts, backbone.wall_contacts)
         sides = contact_sides(reduced)
-        material = Material(np.ones(network.packing.count), np.zeros(reduced.count + reduced.walls.size))
-        elements = METHODS["chord"].elements(sides, material)
-        system = assemble(elements, *prescribe(reduced, (0,), backbone, sides, elements.modes))
+        elements = METHODS["chord"].elements(sides, np.ones(network.packing.count), 1)
+        system = assemble(elements, *contact_lift(reduced, (0,), backbone.clusters, sides, elements.modes))
         rhs, lift = np.ascontiguousarray(system.rhs[:, 0]), float(system.lift_energies[0])
         begin = time.perf_counter()
         preconditioner = build_preconditioner(system.matrix)

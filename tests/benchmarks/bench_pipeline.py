@@ -16,6 +16,8 @@ import sys
 import time
 from importlib.util import find_spec
 
+from etc_engine.solvers import Limits
+
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
@@ -36,10 +38,11 @@ def measure(count: int, direct: bool, stock: bool) -> dict:
     """Seconds and peak memory after each stage for about ``count`` disks between walls."""
     from etc_engine.box import Box
     from etc_engine.engines.dtem.assembly import assemble
-    from etc_engine.engines.dtem.element import Material
+
+    pass
     from etc_engine.engines.dtem.methods import METHODS
-    from etc_engine.engines.dtem.steady import prescribe
     from etc_engine.medium.backbone import find_backbone
+    from etc_engine.medium.loads import contact_lift
     from etc_engine.medium.rules import bonded_contacts
     from etc_engine.medium.sides import contact_sides
     from etc_engine.packing import PackingSpec, pack, parse_radii
@@ -61,9 +64,8 @@ def measure(count: int, direct: bool, stock: bool) -> dict:
     backbone = timed("backbone", lambda: find_backbone(network, (0,)))
     reduced = network.select(backbone.contacts, backbone.wall_contacts)
     sides = timed("sides", lambda: contact_sides(reduced))
-    material = Material(np.ones(packing.count), np.zeros(reduced.count + reduced.walls.size))
-    elements = timed("elements", lambda: METHODS["chord"].elements(sides, material))
-    loads = prescribe(reduced, (0,), backbone, sides, elements.modes)
+    elements = timed("elements", lambda: METHODS["chord"].elements(sides, np.ones(packing.count), 1))
+    loads = contact_lift(reduced, (0,), backbone.clusters, sides, elements.modes)
     system = timed("assemble", lambda: assemble(elements, *loads))
     preconditioner = timed("set-up", lambda: build_preconditioner(system.matrix))
     rhs, lift = np.ascontiguousarray(system.rhs[:, 0]), float(system.lift_energies[0])
@@ -78,7 +80,12 @@ def measure(count: int, direct: bool, stock: bool) -> dict:
     }
     loose_time, loose = time_of(
         lambda: solve_energy(
-            system.matrix, rhs, lift, preconditioner=preconditioner, tolerance=1e-8, balance_tolerance=1.0
+            system.matrix,
+            rhs,
+            lift,
+            preconditioner=preconditioner,
+            tolerance=1e-8,
+            limits=Limits(balance_tolerance=1.0),
         )
     )
     out["to_1e-8"] = loose_time

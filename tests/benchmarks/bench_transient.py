@@ -20,12 +20,13 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMB
 import numpy as np  # noqa: E402 - after the thread counts are set
 
 from etc_engine.box import Box  # noqa: E402
-from etc_engine.engines.pipe.conductances import pipe_conductances  # noqa: E402
 from etc_engine.engines.pipe.steady import pipe_conductivity  # noqa: E402
-from etc_engine.engines.pipe.transient import pipe_transient  # noqa: E402
+from etc_engine.medium.conductances import contact_conductances  # noqa: E402
+from etc_engine.medium.medium import medium_of  # noqa: E402
 from etc_engine.medium.network import ContactNetwork, bonded_contacts  # noqa: E402
 from etc_engine.medium.walls import FixedTemperature  # noqa: E402
 from etc_engine.packing import PackingSpec, pack, parse_radii  # noqa: E402
+from etc_engine.realization import transient_system  # noqa: E402
 from etc_engine.solvers.marching import march  # noqa: E402
 
 RADII = "uniform:0.01:0.02"
@@ -50,7 +51,9 @@ def timed(work):
 def implicit_steps(count: int) -> None:
     """Seconds of the set-up and of a step of every implicit scheme, by multigrid and by a factorisation."""
     network = bed(count)
-    build, system = timed(lambda: pipe_transient(network, {"left": FixedTemperature(1.0)}))
+    build, system = timed(
+        lambda: transient_system(medium_of(network, heat_capacity=1.0), {"left": FixedTemperature(1.0)}, engine="pipe")
+    )
     disks = network.packing.count
     scale = network.packing.box.lengths[0] ** 2 * 0.8 / 0.19  # about its diffusion time, rho c = kappa = 1
     cases = [(scheme, 500) for scheme in ("backward-euler", "crank-nicolson", "bdf2")] + [("bdf2", 2_000_000)]
@@ -82,14 +85,14 @@ def against_openpnm(count: int) -> None:
     """The steady network and a transient, by both."""
     network = bed(count)
     disks = network.packing.count
-    ours_steady, result = timed(lambda: pipe_conductivity(network, axes=(0,)))
+    ours_steady, result = timed(lambda: pipe_conductivity(medium_of(network), axes=(0,)))
     theirs_steady, (project, theirs_k, kept) = timed(lambda: openpnm_steady(network, result))
     print(
         f"{disks:8d} disks  steady     ours {ours_steady:8.3f} s, OpenPNM {theirs_steady:8.3f} s, ratio "
         f"{theirs_steady / ours_steady:6.1f}, k {result.tensor[0, 0]:.10f} and {theirs_k:.10f}"
     )
     walls = {"left": FixedTemperature(1.0), "right": FixedTemperature(0.0)}
-    system = pipe_transient(network, walls)
+    system = transient_system(medium_of(network, heat_capacity=1.0), walls, engine="pipe")
     span = 0.02 * network.packing.box.lengths[0] ** 2
     tolerance = 1e-4
     times = [0.0, span]
@@ -110,7 +113,7 @@ def openpnm_steady(network: ContactNetwork, ours):
     import openpnm
 
     n = network.packing.count
-    between, at_wall = pipe_conductances(network)
+    between, at_wall = contact_conductances(medium_of(network))
     clusters = ours.solutions[0].backbone.clusters
     touching = [np.unique(clusters[network.wall_particles[network.walls == wall]]) for wall in (0, 1)]
     kept = np.flatnonzero(np.isin(clusters, np.intersect1d(*touching)))
@@ -153,7 +156,14 @@ def main() -> None:
     parser.add_argument("--largest", type=float, default=1e6)
     parser.add_argument("--openpnm", type=float, default=1e4, help="disks of the comparison; 0 leaves it out")
     arguments = parser.parse_args()
-    list(march(pipe_transient(bed(100), {}).heat, np.zeros(bed(100).packing.count), [0.0, 1.0], steps=1))  # warm up
+    list(
+        march(
+            transient_system(medium_of(bed(100), heat_capacity=1.0), {}, engine="pipe").heat,
+            np.zeros(bed(100).packing.count),
+            [0.0, 1.0],
+            steps=1,
+        )
+    )  # warm up
     for count in (10_000, 100_000, 1_000_000):
         if count <= arguments.largest:
             implicit_steps(count)

@@ -18,6 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from etc_engine.engines.voxel import Scheme
+from etc_engine.medium.medium import Medium, Pores
+
 PORESPY = """
 import json, sys, time, warnings
 warnings.simplefilter("ignore")
@@ -34,11 +37,12 @@ print(json.dumps({"conductivity": float(found.effective_porosity / found.tortuos
 
 def composite(d: int, count: int, fraction: float, contrast: float):
     from etc_engine import Box, PackingSpec, pack, parse_radii
-    from etc_engine.medium.composite import Composite
+
+    pass
 
     box = Box((1.0,) * d, (True,) * d)
     spec = PackingSpec("lubachevsky-stillinger", parse_radii("equal"), box, count, fraction)
-    return Composite(pack(spec, np.random.default_rng(811)), 1.0, np.array(contrast))
+    return Medium(pack(spec, np.random.default_rng(811)), np.array(contrast), pores=Pores(1.0))
 
 
 def one(d: int, resolution: int, contrast: float, solver: str) -> dict[str, float]:
@@ -47,12 +51,12 @@ def one(d: int, resolution: int, contrast: float, solver: str) -> dict[str, floa
 
     made = composite(d, 50, 0.4, contrast)
     voxelize(made, 32)  # compile
-    solve_cell(voxelize(made, 16).conductivity, (1.0,) * d, solver=solver, axes=(0,))
+    solve_cell(voxelize(made, 16).conductivity, (1.0,) * d, axes=(0,), scheme=Scheme(solver=solver))
     base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.process_time()
     image = voxelize(made, resolution)
     voxelized = time.process_time()
-    solved = solve_cell(image.conductivity, (1.0,) * d, solver=solver, axes=(0,))
+    solved = solve_cell(image.conductivity, (1.0,) * d, axes=(0,), scheme=Scheme(solver=solver))
     stop = time.process_time()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base
     return {
@@ -106,7 +110,7 @@ def against_porespy(python: str) -> None:
                 subprocess.run(line, capture_output=True, text=True, check=True).stdout.splitlines()[-1]
             )
         start = time.process_time()
-        ours = solve_cell(image, (1.0,) * d, boundary="walls", axes=(0,), tolerance=1e-6).tensor[0, 0]
+        ours = solve_cell(image, (1.0,) * d, boundary="walls", axes=(0,), scheme=Scheme(tolerance=1e-6)).tensor[0, 0]
         seconds = time.process_time() - start
         print(
             f"{f'{n}^{d}':>10}{theirs['conductivity']:14.5f}{ours:10.5f}{theirs['seconds']:11.2f}{seconds:8.2f}"

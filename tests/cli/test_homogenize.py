@@ -157,19 +157,22 @@ BAD = [
     (("--inclusion", 7.7, "--resolution", 3), "too coarse: the smallest inclusion"),
     ((), "conductivity of the inclusions is missing"),
     (("--inclusion", -1), "must not be negative"),
-    (("--inclusion", 0, "--matrix", 0), "neither the matrix nor an inclusion conducts"),
-    (("--inclusion", 2, "--engine", "fem"), "'fem' is not one of"),
-    (("--inclusion", 2, "--particles", 100), "--particles does not go with --engine voxel"),
-    (("--inclusion", 2, "--engine", "lattice", "--resolution", 32), "--resolution does not go with --engine lattice"),
+    (("--inclusion", 0, "--matrix", 0), "neither the particles nor the pores conduct"),
+    (("--inclusion", 2, "--engine", "fem"), "unknown engine 'fem'"),
+    (("--inclusion", 2, "--particles", 100), "--particles is not valid with --engine voxel"),
+    (("--inclusion", 2, "--engine", "lattice", "--resolution", 32), "--resolution is not valid with --engine lattice"),
     (("--inclusion", 2, "--box", "1,1"), "a 2D box needs"),
     (("--inclusion", 2, "--box", "1,-1,1"), "positive"),
     (("--inclusion", 2, "--frame", 0), "holds one packing: leave the frame out"),
     (("--inclusion", 2, "--plot", "p.bmp"), "a picture is written as"),
-    (("--inclusion", 2, "--resolution", 0), "the resolution is a whole number of at least 1, found 0"),
+    (("--inclusion", 2, "--resolution", 0), "resolution: found 0, allowed: a whole number of at least 2"),
     (("--inclusion", 2, "--resolution", 1000000), "needs about 1.68e+11 GB of memory"),
     (("--inclusion", 1e300, "--matrix", 1e-300), "within a factor of 1e+15"),
     (("--inclusion", 1e20), "give 0 or inf"),
-    (("--inclusion", 2, "--engine", "lattice", "--particles", 0), "at least 50 particles, found 0"),
+    (
+        ("--inclusion", 2, "--engine", "lattice", "--particles", 0),
+        "particles: found 0, allowed: a whole number",
+    ),
     (("--inclusion", "inf", "--plot", "p.png"), "--plot needs finite conductivities"),
     (("--inclusion", 2, "-o", "/nowhere/out.nc"), "cannot write"),
 ]
@@ -192,10 +195,10 @@ def test_bad_geometries_are_refused(etc_engine, table, tmp_path):
         )
 
     assert "holds no particles" in line()
-    assert "leave no matrix" in line("0.5,0.5,0.9")
+    assert "leave no pores" in line("0.5,0.5,0.9")
     assert "outside the box" in line("1.4,0.5,0.1", options=("--boundary", "walls"))
     assert "radius that is not positive" in line("0.4,0.5,0")
-    assert "the inclusions are disks" in line("0.4,0.5,0.2", options=("--engine", "lattice"))
+    assert "engine lattice works in 3D, found a medium in 2D" in line("0.4,0.5,0.2", options=("--engine", "lattice"))
     assert "there is no file" in refused(etc_engine("homogenize", tmp_path / "none.csv", "--matrix", 1))
     path = table("0.4,0.5,0.2", header="x,y,radius")
     assert "--box is missing" in refused(etc_engine("homogenize", path, "--matrix", 1, "--inclusion", 2))

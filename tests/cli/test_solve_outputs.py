@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import xarray
 
-from etc_engine.engines.dtem.effective import effective_conductivity
 from etc_engine.engines.dtem.field import recover_field
-from etc_engine.engines.dtem.raster import sample_image
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import overlap_contacts
+from etc_engine.output.raster import sample_image
+from etc_engine.realization import effective_conductivity
 
 TABLE_2 = Path(__file__).parents[1] / "published" / "data" / "feng2008_table2_particles.csv"
 BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
@@ -43,7 +44,7 @@ def test_vtk_holds_disks_and_contacts(etc_engine, tmp_path):
     particle = vtk_to_numpy(cells.GetArray("particle"))
     assert np.count_nonzero(particle == -1) == 17
     mean = vtk_to_numpy(cells.GetArray("mean_temperature"))
-    solution = effective_conductivity(overlap_contacts(_table_2()), axes=(0,)).solutions[0]
+    solution = effective_conductivity(medium_of(overlap_contacts(_table_2())), axes=(0,)).solutions[0]
     field = recover_field(solution)
     np.testing.assert_array_equal(mean[particle == 3], field.particle_temperatures[3])
     np.testing.assert_array_equal(vtk_to_numpy(cells.GetArray("heat_flow"))[:17], field.contact_flows)
@@ -61,8 +62,8 @@ def _table_2():
 
 def test_image_fills_the_particles_and_their_union():
     packing = _table_2()
-    solution = effective_conductivity(overlap_contacts(packing), axes=(0,)).solutions[0]
-    image, owners = sample_image(solution, recover_field(solution), 500)
+    solution = effective_conductivity(medium_of(overlap_contacts(packing)), axes=(0,)).solutions[0]
+    image, owners = sample_image(recover_field(solution), 500)
     from etc_engine.structure.union import union_area
 
     assert np.mean(owners >= 0) == pytest.approx(union_area(packing), abs=2e-3)
@@ -76,8 +77,8 @@ def test_periodic_image_follows_the_gradient(hexagonal):
     from etc_engine.medium.rules import bonded_contacts
 
     packing = hexagonal(2, 2)
-    solution = effective_conductivity(bonded_contacts(packing, 0.15)).solutions[0]
-    image, _ = sample_image(solution, recover_field(solution), 400)
+    solution = effective_conductivity(medium_of(bonded_contacts(packing, 0.15))).solutions[0]
+    image, _ = sample_image(recover_field(solution), 400)
     x = (np.arange(image.shape[1]) + 0.5) / image.shape[1] * packing.box.lengths[0]
     deviation = image - x
     assert np.nanmax(deviation) - np.nanmin(deviation) < 0.8  # less than a particle, not a box
@@ -157,4 +158,4 @@ def test_nothing_in_contact_is_said(etc_engine, tmp_path):
 def test_a_bond_gap_without_bonds_is_refused(etc_engine):
     done = etc_engine("solve", TABLE_2, "--box", "1,1", "--bond-gap", 0.1)
     assert done.returncode == 2
-    assert "goes with --contact-angle" in done.stderr
+    assert "is only valid with --contact-angle" in done.stderr

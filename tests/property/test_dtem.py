@@ -10,16 +10,15 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.closed_form import closed_form_elements
-from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
-from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.methods import METHODS
 from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.errors import EtcError, GeometryError
 from etc_engine.medium.backbone import find_backbone
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 METHOD = st.sampled_from(sorted(METHODS))
 SETTINGS = settings(deadline=None, max_examples=40)
@@ -43,7 +42,7 @@ def jittered(seed: int, n: int, growth: float, periodic: tuple[bool, bool]) -> P
 def test_random_overlapping_disks_are_solved_or_refused(seed, n, growth, periodic, method):
     packing = jittered(seed, n, growth, periodic)
     try:
-        result = effective_conductivity(overlap_contacts(packing), method=method)
+        result = effective_conductivity(medium_of(overlap_contacts(packing)), method=method)
     except GeometryError:
         return
     diagonal = np.diag(result.tensor)
@@ -52,7 +51,7 @@ def test_random_overlapping_disks_are_solved_or_refused(seed, n, growth, periodi
     assert all((k > 0.0) or not flag for k, flag in zip(diagonal, result.spans, strict=True))
     for solution in result.solutions:
         if not packing.box.periodic[solution.axes[0]]:
-            heat_in, heat_out = wall_heat_flows(solution)
+            heat_in, heat_out = solution.wall_heat()
             assert heat_in == pytest.approx(solution.energies[0, 0], rel=1e-9, abs=1e-15)
             assert heat_out == pytest.approx(heat_in, rel=1e-9, abs=1e-15)
 
@@ -68,7 +67,7 @@ def test_two_contacts_of_a_disk_at_any_angle_are_solved_or_refused(degrees, angl
         network = bonded_contacts(packing, np.radians(degrees))
         sides = contact_sides(network)
         assume(not overlapping)
-        elements = METHODS[method].elements(sides, Material(np.ones(3), np.zeros(network.count)))
+        elements = METHODS[method].elements(sides, np.ones(3), METHODS[method].modes)
     except EtcError:
         return
     block = elements.values[elements.starts[0] : elements.starts[1]]
@@ -86,7 +85,7 @@ def test_many_contacts_on_one_disk(count, method):
     packing = ParticlePacking(np.concatenate([[[10.0, 10.0]], rim]), [1.0, *np.full(count, r)], Box((20.0, 20.0)))
     network = bonded_contacts(packing, np.radians(80.0 / count))
     assert network.count == count
-    elements = METHODS[method].elements(contact_sides(network), Material(np.ones(count + 1), np.zeros(count)))
+    elements = METHODS[method].elements(contact_sides(network), np.ones(count + 1), METHODS[method].modes)
     size = count * elements.modes
     hub = elements.values[: size * size].reshape(size, size)
     heat = hub[:: elements.modes, :: elements.modes]
@@ -103,7 +102,8 @@ def test_unequal_disks_between_walls(ratio):
     packing = ParticlePacking([[large, 0.5], [2 * large + small, 0.5]], [large, small], Box((1.0, 1.0)))
     equal = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
     one, other = (
-        effective_conductivity(bonded_contacts(p, 0.05, 1e-9), axes=(0,)).tensor[0, 0] for p in (packing, equal)
+        effective_conductivity(medium_of(bonded_contacts(p, 0.05, 1e-9)), axes=(0,)).tensor[0, 0]
+        for p in (packing, equal)
     )
     assert one == pytest.approx(other, rel=1e-10)
 
@@ -117,8 +117,7 @@ def test_contact_resistance_equals_the_doubled_system(resistance, method):
     backbone = find_backbone(network, (0,))
     reduced = network.select(backbone.contacts, backbone.wall_contacts)
     sides = contact_sides(reduced)
-    m, w = reduced.count, reduced.walls.size
-    elements = closed_form_elements(sides, Material(np.ones(packing.count), np.zeros(m + w)), method=method)
+    elements = METHODS[method].elements(sides, np.ones(packing.count), 1)
     # every side has its own face temperature; behind a wall's bar lies the wall
     faces = sides.nodes.size
     rows, columns, values = [], [], []
@@ -142,7 +141,7 @@ def test_contact_resistance_equals_the_doubled_system(resistance, method):
     temperature = spsolve(K, rhs)
     hot = sides.of_walls[reduced.walls == 0]
     doubled = np.sum((1.0 - temperature[hot]) / resistance)
-    solution = solve_steady(network, (0,), method=method, contact_resistance=resistance)
+    solution = solve_steady(medium_of(network.with_resistance(resistance)), (0,), method=method)
     assert solution.energies[0, 0] == pytest.approx(doubled, rel=1e-8)
     from etc_engine.engines.dtem.field import recover_field
 
@@ -152,10 +151,12 @@ def test_contact_resistance_equals_the_doubled_system(resistance, method):
 
 def test_limits_of_the_contact_resistance():
     network = overlap_contacts(jittered(32, 6, 1.06, (False, False)))
-    bare = effective_conductivity(network, axes=(0,)).tensor[0, 0]
-    small = effective_conductivity(network, contact_resistance=1e-9, axes=(0,)).tensor[0, 0]
+    bare = effective_conductivity(medium_of(network), axes=(0,)).tensor[0, 0]
+    small = effective_conductivity(medium_of(network.with_resistance(1e-9)), axes=(0,)).tensor[0, 0]
     assert small == pytest.approx(bare, rel=1e-7)
-    large = [effective_conductivity(network, contact_resistance=r, axes=(0,)).tensor[0, 0] * r for r in (1e5, 1e6)]
+    large = [
+        effective_conductivity(medium_of(network.with_resistance(r)), axes=(0,)).tensor[0, 0] * r for r in (1e5, 1e6)
+    ]
     assert large[0] == pytest.approx(large[1], rel=1e-4)  # particles become isothermal: k ~ 1/R_c
 
 
@@ -164,6 +165,6 @@ def test_clusters_on_one_wall_take_its_temperature():
 
     triangle = [[0.1, 0.3], [0.3, 0.3], [0.2, 0.3 + np.sqrt(0.03)]]
     packing = ParticlePacking([*triangle, [0.9, 0.5]], [0.1] * 4, Box((1.0, 1.0)))
-    result = effective_conductivity(bonded_contacts(packing, 0.1), axes=(0,))
+    result = effective_conductivity(medium_of(bonded_contacts(packing, 0.1)), axes=(0,))
     assert result.tensor[0, 0] == 0.0
     assert recover_field(result.solutions[0]).particle_temperatures.tolist() == [1.0, 1.0, 1.0, 0.0]

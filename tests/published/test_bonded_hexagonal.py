@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from etc_engine.engines.dtem.effective import effective_conductivity
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts
+from etc_engine.realization import effective_conductivity
 
 
 @pytest.mark.parametrize(
     ("degrees", "value"), [(5, 0.62564), (10, 0.74811), (15, 0.84357), (20, 0.92121), (25, 0.97733)]
 )
 def test_conductivity_of_the_bonded_hexagonal_lattice(hexagonal, degrees, value):
-    tensor = effective_conductivity(bonded_contacts(hexagonal(), np.radians(degrees)), method="exact").tensor
+    tensor = effective_conductivity(medium_of(bonded_contacts(hexagonal(), np.radians(degrees))), method="exact").tensor
     np.testing.assert_allclose(tensor, value * np.eye(2), atol=6e-6)
 
 
@@ -21,5 +22,5 @@ def test_conductivity_of_the_bonded_hexagonal_lattice(hexagonal, degrees, value)
 def test_it_tends_to_the_solid_at_thirty_degrees(hexagonal, degrees, error):
     """There the chords meet and the disks fill the plane."""
     network = bonded_contacts(hexagonal(), np.radians(degrees))
-    value = effective_conductivity(network, method="exact", modes=7).tensor[0, 0]
+    value = effective_conductivity(medium_of(network), method="exact", modes=7).tensor[0, 0]
     assert 1.0 - error < value < 1.0

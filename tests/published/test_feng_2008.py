@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
 from etc_engine.engines.dtem.field import recover_field
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import overlap_contacts
+from etc_engine.realization import effective_conductivity
 
 DATA = Path(__file__).parent / "data"
 # corner-graded finite elements, energy bounds from above and below agree to 1e-7
@@ -30,7 +31,7 @@ def table4():
 def test_the_assembly_has_17_contacts_and_4_on_the_driven_walls(network):
     assert network.count == 17
     assert network.walls_of(0).size == 4
-    assert effective_conductivity(network, axes=(0,)).unknowns == 17
+    assert effective_conductivity(medium_of(network), axes=(0,)).unknowns == 17
 
 
 def test_contact_half_angles_lie_in_the_published_range(network):
@@ -47,7 +48,7 @@ def test_contact_half_angles_lie_in_the_published_range(network):
 )
 def test_effective_conductivity_of_table_3(network, method, row, digits):
     table = dict(np.loadtxt(DATA / "feng2008_table3_effective_conductivity.csv", delimiter=",", skiprows=1, dtype=str))
-    assert effective_conductivity(network, method=method, axes=(0,)).tensor[0, 0] == pytest.approx(
+    assert effective_conductivity(medium_of(network), method=method, axes=(0,)).tensor[0, 0] == pytest.approx(
         float(table[row]), abs=digits
     )
 
@@ -57,13 +58,13 @@ def test_effective_conductivity_of_table_3(network, method, row, digits):
 )
 def test_effective_conductivity_of_every_method(network, method, value):
     """Values of an independent prototype with quadrature instead of the closed form."""
-    assert effective_conductivity(network, method=method, axes=(0,)).tensor[0, 0] == pytest.approx(
+    assert effective_conductivity(medium_of(network), method=method, axes=(0,)).tensor[0, 0] == pytest.approx(
         value, abs=6e-7 if method != "arc" else 5e-8
     )
 
 
 def test_chord_is_within_a_hundredth_of_a_percent_of_the_converged_truth(network):
-    value = effective_conductivity(network, method="chord", axes=(0,)).tensor[0, 0]
+    value = effective_conductivity(medium_of(network), method="chord", axes=(0,)).tensor[0, 0]
     assert abs(value / CONVERGED_TRUTH - 1.0) < 1e-4
 
 
@@ -76,25 +77,27 @@ def test_chord_is_within_a_hundredth_of_a_percent_of_the_converged_truth(network
     ],
 )
 def test_contact_temperatures_of_table_4(network, table4, method, column, digits):
-    solution = effective_conductivity(network, method=method, axes=(0,)).solutions[0]
+    solution = effective_conductivity(medium_of(network), method=method, axes=(0,)).solutions[0]
     pairs = np.stack([table4["particle_a"], table4["particle_b"]], axis=1).astype(int) - 1
     np.testing.assert_array_equal(network.pairs, pairs)
     np.testing.assert_allclose(recover_field(solution).contact_temperatures, table4[column], atol=digits, rtol=0)
 
 
 def test_heat_in_equals_heat_out_equals_energy(network):
-    result = effective_conductivity(network, axes=(0,))
-    heat_in, heat_out = wall_heat_flows(result.solutions[0])
+    result = effective_conductivity(medium_of(network), axes=(0,))
+    heat_in, heat_out = result.solutions[0].wall_heat()
     assert heat_in == pytest.approx(result.tensor[0, 0], rel=1e-12)
     assert heat_out == pytest.approx(result.tensor[0, 0], rel=1e-12)
 
 
 def test_exact_reaches_the_converged_truth_with_three_modes(network):
-    value = effective_conductivity(network, method="exact", axes=(0,), tolerance=1e-12).tensor[0, 0]
+    value = effective_conductivity(medium_of(network), method="exact", axes=(0,), tolerance=1e-12).tensor[0, 0]
     assert value == pytest.approx(CONVERGED_TRUTH, abs=1e-7)
 
 
 def test_disks_cut_by_the_driven_walls_alone(network):
     """0.2787795, of an independent prototype."""
     uncut = replace(network, geometric=False)
-    assert effective_conductivity(uncut, method="exact", axes=(0,)).tensor[0, 0] == pytest.approx(0.2787795, abs=2e-7)
+    assert effective_conductivity(medium_of(uncut), method="exact", axes=(0,)).tensor[0, 0] == pytest.approx(
+        0.2787795, abs=2e-7
+    )

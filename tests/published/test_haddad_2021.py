@@ -13,11 +13,11 @@ from etc_engine.box import Box
 from etc_engine.engines.lattice.calibration import calibrate, pack_lattice
 from etc_engine.engines.lattice.exact import ball_temperature, slab_temperature
 from etc_engine.engines.lattice.flux import halo_flux, probe
-from etc_engine.engines.lattice.homogenize import composite_lattice, dense_packing, node_conductivities
+from etc_engine.engines.lattice.homogenize import dense_packing, medium_lattice, node_conductivities
 from etc_engine.engines.lattice.network import contact_lattice, laguerre_lattice, link_conductances
 from etc_engine.engines.lattice.steady import conductivity_tensor, solve_between_walls, solve_with_gradient
 from etc_engine.engines.lattice.transient import heat_system
-from etc_engine.medium.composite import Composite
+from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.solvers.marching import march
@@ -106,8 +106,8 @@ EXACT_INCLUSION = {
 @pytest.fixture(scope="module")
 def inclusion():
     sphere = ParticlePacking([[0.5 * LENGTH] * 3], [LENGTH / 3.0], Box((LENGTH,) * 3))
-    body = Composite(sphere, STEEL["k"], 165.0)
-    return body, composite_lattice(body, 10_000, np.random.default_rng(2024), boundary="walls")
+    body = Medium(sphere, 165.0, pores=Pores(STEEL["k"]))
+    return body, medium_lattice(body, 10_000, np.random.default_rng(2024), boundary="walls")
 
 
 @pytest.mark.parametrize("contrast", EXACT_INCLUSION)

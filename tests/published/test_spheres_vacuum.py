@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import effective_conductivity
 from etc_engine.engines.pipe.steady import pipe_conductivity
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "spheres_vacuum.json").read_text())
 LATTICES = [case for case in REFERENCE if case["kind"] == "vacuum_lattice"]
@@ -50,7 +51,7 @@ def allowed(case: dict) -> float:
 def test_chord_on_lattices(case):
     network = overlap_contacts(lattice(case["lattice"], 2.0 * np.cos(np.radians(case["angle_deg"]))))
     assert network.count == 8 * CONTACTS[case["lattice"]]
-    tensor = effective_conductivity(network).tensor
+    tensor = effective_conductivity(medium_of(network)).tensor
     assert tensor == pytest.approx(tensor[0, 0] * np.eye(3), abs=1e-12)
     assert tensor[0, 0] == pytest.approx(case["value"], rel=allowed(case))
 
@@ -58,7 +59,7 @@ def test_chord_on_lattices(case):
 @pytest.mark.parametrize("case", WALLS, ids=lambda c: f"{c['case']}")
 def test_chord_between_walls(case):
     network = overlap_contacts(between_walls(case))
-    conductance = effective_conductivity(network, axes=(0,)).tensor[0, 0] * 121.0
+    conductance = effective_conductivity(medium_of(network), axes=(0,)).tensor[0, 0] * 121.0
     assert conductance == pytest.approx(case["value"], rel=6e-4)
 
 
@@ -69,7 +70,7 @@ EXACT = [case for case in LATTICES if case["angle_deg"] >= 20]
 def test_exact_converges_to_finite_elements_on_lattices(case):
     """Degrees 0 .. 3 of the flux modes; the truth is known to its own error only."""
     network = overlap_contacts(lattice(case["lattice"], 2.0 * np.cos(np.radians(case["angle_deg"])), 1))
-    found = [effective_conductivity(network, method="exact", modes=n).tensor[0, 0] for n in (1, 2, 3, 4)]
+    found = [effective_conductivity(medium_of(network), method="exact", modes=n).tensor[0, 0] for n in (1, 2, 3, 4)]
     errors = np.abs(np.array(found) / case["value"] - 1.0)
     own = case["error"] / case["value"]
     assert errors[3] < own
@@ -83,7 +84,7 @@ def test_exact_converges_to_finite_elements_on_lattices(case):
 def test_exact_between_walls_that_cut_the_spheres_on_all_sides(case):
     centers = np.array(case["centres"])[:, [2, 0, 1]]
     network = overlap_contacts(ParticlePacking(centers, np.array(case["radii"]), Box((1.0, 1.0, 1.0))))
-    found = effective_conductivity(network, method="exact", axes=(0,)).tensor[0, 0]
+    found = effective_conductivity(medium_of(network), method="exact", axes=(0,)).tensor[0, 0]
     assert found == pytest.approx(case["value"], rel=case["error"] / case["value"])
 
 
@@ -92,10 +93,10 @@ def test_small_contacts_conduct_like_two_kappa_c(name):
     """A contact of radius c between half-spaces passes 2 kappa c (Holm)."""
     for alpha in (1e-3, 1e-4):
         packing = lattice(name, 2.0)
-        found = pipe_conductivity(bonded_contacts(packing, alpha, 1e-9)).tensor[0, 0]
+        found = pipe_conductivity(medium_of(bonded_contacts(packing, alpha, 1e-9))).tensor[0, 0]
         along = 8 * CONTACTS[name] * 4.0 / 3.0
         law = 2.0 * np.sin(alpha) * along / packing.box.volume
         assert found == pytest.approx(law, rel=10 * alpha)
-        assert effective_conductivity(bonded_contacts(packing, alpha, 1e-9)).tensor[0, 0] == pytest.approx(
+        assert effective_conductivity(medium_of(bonded_contacts(packing, alpha, 1e-9))).tensor[0, 0] == pytest.approx(
             law, rel=20 * alpha
         )

@@ -6,7 +6,7 @@ from scipy.sparse import csr_matrix, diags_array, eye_array, kron
 from scipy.sparse.linalg import spsolve
 
 from etc_engine.errors import ConvergenceError
-from etc_engine.solvers import build_preconditioner, solve_energy
+from etc_engine.solvers import Limits, build_preconditioner, solve_energy
 from etc_engine.solvers.amg_cg import radau_factor
 
 
@@ -36,7 +36,7 @@ def test_energy_error_is_estimated_from_above_and_below_tolerance(exact_level, t
         energy,
         preconditioner=build_preconditioner(matrix, exact_level),
         tolerance=tolerance,
-        balance_tolerance=1.0,
+        limits=Limits(balance_tolerance=1.0),
     )
     error = float((u - exact) @ (matrix @ (u - exact))) / (energy - float(rhs @ exact))
     assert error <= 1.01 * report.relative_energy_error + 1e-15
@@ -95,8 +95,8 @@ def test_running_out_of_iterations_raises_with_the_history():
             np.ones(matrix.shape[0]),
             1e5,
             preconditioner=build_preconditioner(matrix, 100),
-            max_iterations=2,
             tolerance=1e-14,
+            limits=Limits(max_iterations=2),
         )
     assert len(caught.value.residuals) == 3
 
@@ -113,7 +113,12 @@ def test_heat_balances_to_round_off_and_the_correction_lowers_the_error():
     exact = spsolve(matrix.tocsc(), rhs)
     energy = 2.0 * float(rhs @ exact)
     u, report = solve_energy(
-        matrix, rhs, energy, preconditioner=build_preconditioner(matrix, 100), tolerance=1e-6, balance_tolerance=1.0
+        matrix,
+        rhs,
+        energy,
+        preconditioner=build_preconditioner(matrix, 100),
+        tolerance=1e-6,
+        limits=Limits(balance_tolerance=1.0),
     )
     assert abs((rhs - matrix @ u).sum()) < 1e-11 * energy
     assert report.imbalance < 1e-11

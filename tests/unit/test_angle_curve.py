@@ -11,14 +11,16 @@ from scipy.linalg import eigh
 from etc_engine.box import Box
 from etc_engine.engines.dtem import angle_curve
 from etc_engine.engines.dtem.angle_curve import solve_angle_curve
-from etc_engine.engines.dtem.effective import conductivity_curve, effective_conductivity
-from etc_engine.engines.dtem.element import Material, smallest_ratio
+from etc_engine.engines.dtem.conductivity import conductivity_curve, element_conductivity
+from etc_engine.engines.dtem.element import smallest_ratio
 from etc_engine.engines.dtem.methods import find_method
 from etc_engine.engines.dtem.steady import solve_steady
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts
 from etc_engine.medium.sides import contact_sides
 from etc_engine.packing import PackingSpec, pack, parse_radii
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 
 def packed(radii):
@@ -42,17 +44,22 @@ def honeycomb(columns=6, rows=4):
     return bonded_contacts(packing, 0.1), np.random.default_rng(312).uniform(0.2, 5.0, len(centers))
 
 
-def energies(network, angles, axes, **options):
+def at_angle(medium, angle):
+    return medium.with_network(medium.links.with_half_angle(angle))
+
+
+def energies(medium, angles, axes, **options):
     return [
-        np.diag(solve_steady(network.with_half_angle(angle), axes, tolerance=1e-13, **options).energies)
-        for angle in angles
+        np.diag(solve_steady(at_angle(medium, angle), axes, tolerance=1e-13, **options).energies) for angle in angles
     ]
 
 
 def test_twenty_angles_take_three_solves(walled):
     angles = np.radians(np.linspace(1.0, 20.0, 20))
-    curve = dict(solve_angle_curve(walled, (0,), angles))
-    excess = np.array([curve[i].energies[0, 0] / e[0] - 1.0 for i, e in enumerate(energies(walled, angles, (0,)))])
+    curve = dict(solve_angle_curve(medium_of(walled), (0,), angles))
+    excess = np.array(
+        [curve[i].energies[0, 0] / e[0] - 1.0 for i, e in enumerate(energies(medium_of(walled), angles, (0,)))]
+    )
     assert sum(solution.snapshots == 0 for solution in curve.values()) <= 3
     assert excess.max() <= 1e-8
     assert excess.min() > -1e-12  # an upper bound of the discrete energy
@@ -64,12 +71,12 @@ def test_twenty_angles_take_three_solves(walled):
 def test_an_extreme_range_is_solved_in_full_more_often(method):
     network, kappa = honeycomb()
     angles = np.radians(np.geomspace(0.1, 59.0 if method == "arc" else 45.0, 12))
-    options = {"method": method, "conductivity": kappa, "contact_resistance": 0.01}
-    curve = dict(solve_angle_curve(network, (0, 1), angles, **options))
-    narrow = dict(solve_angle_curve(network, (0, 1), np.radians(np.geomspace(2.0, 4.0, 12)), **options))
+    medium = medium_of(network.with_resistance(0.01), kappa)
+    curve = dict(solve_angle_curve(medium, (0, 1), angles, method=method))
+    narrow = dict(solve_angle_curve(medium, (0, 1), np.radians(np.geomspace(2.0, 4.0, 12)), method=method))
     full = [sum(solution.snapshots == 0 for solution in c.values()) for c in (curve, narrow)]
     assert 12 > full[0] > full[1]
-    for index, exact in enumerate(energies(network, angles, (0, 1), **options)):
+    for index, exact in enumerate(energies(medium, angles, (0, 1), method=method)):
         excess = np.diag(curve[index].energies) / exact - 1.0
         assert excess.min() > -1e-12
         assert excess.max() <= 1e-8
@@ -79,22 +86,22 @@ def test_the_estimate_keeps_out_a_snapshot_that_is_too_far(monkeypatch):
     network, kappa = honeycomb()
     angles = np.radians([0.1, 45.0])
     # without a contact resistance all elements of a honeycomb would change by one factor
-    options = {"conductivity": kappa, "contact_resistance": 0.1}
-    strict = dict(solve_angle_curve(network, (0, 1), angles, **options))
+    medium = medium_of(network.with_resistance(0.1), kappa)
+    strict = dict(solve_angle_curve(medium, (0, 1), angles))
     assert [strict[i].snapshots for i in (0, 1)] == [0, 0]
     monkeypatch.setattr(angle_curve, "TOLERANCE", 1.0)
-    loose = dict(solve_angle_curve(network, (0, 1), angles, tolerance=1.0, **options))
+    loose = dict(solve_angle_curve(medium, (0, 1), angles, tolerance=1.0))
     (far,) = [i for i in (0, 1) if loose[i].snapshots]
-    error = np.diag(loose[far].energies) / energies(network, angles, (0, 1), **options)[far] - 1.0
+    error = np.diag(loose[far].energies) / energies(medium, angles, (0, 1))[far] - 1.0
     assert 1e-6 < error.max() <= loose[far].relative_energy_error
 
 
 def test_the_whole_tensor_of_a_periodic_box():
     network, kappa = honeycomb()
-    options = {"conductivity": kappa, "contact_resistance": 0.1}
+    medium = medium_of(network.with_resistance(0.1), kappa)
     angles = np.radians(np.linspace(3.0, 30.0, 8))
-    for angle, point in zip(angles, conductivity_curve(network, angles, **options), strict=True):
-        exact = effective_conductivity(network.with_half_angle(angle), **options, tolerance=1e-13).tensor
+    for angle, point in zip(angles, conductivity_curve(medium, angles), strict=True):
+        exact = element_conductivity(at_angle(medium, angle), tolerance=1e-13).tensor
         assert abs(exact[0, 1]) > 1e-4
         np.testing.assert_allclose(point.tensor, exact, rtol=0.0, atol=1e-8 * exact.max())
         np.testing.assert_array_equal(point.tensor, point.tensor.T)
@@ -108,20 +115,20 @@ def test_large_systems_are_estimated_not_certified(monkeypatch):
     )
     network = packed("uniform:0.01:0.02")
     angles = np.radians(np.linspace(1.0, 20.0, 10))
-    curve = dict(solve_angle_curve(network, (0,), angles))
+    curve = dict(solve_angle_curve(medium_of(network), (0,), angles))
     reduced = [i for i in curve if curve[i].snapshots]
     assert len(reduced) >= 5
     assert not any(curve[i].certified for i in reduced)
-    exact = energies(network, angles, (0,))
+    exact = energies(medium_of(network), angles, (0,))
     assert all(0.0 < curve[i].energies[0, 0] / exact[i][0] - 1.0 <= curve[i].relative_energy_error for i in reduced)
 
 
 @pytest.mark.parametrize("method", ["chord", "standard", "arc"])
 def test_the_ratio_of_elements_is_below_the_smallest_eigenvalue(walled, method):
     modes = 3 if method == "arc" else 1
-    material = Material(np.ones(walled.packing.count), np.full(walled.count + walled.walls.size, 0.02))
+    kappa, tied = np.ones(walled.packing.count), walled.with_resistance(0.02)
     wide, narrow = (
-        find_method(method).elements(contact_sides(walled.with_half_angle(angle)), material, modes)
+        find_method(method).elements(contact_sides(tied.with_half_angle(angle)), kappa, modes)
         for angle in np.radians([8.0, 2.0])
     )
     for one, other in ((wide, narrow), (narrow, wide)):
@@ -139,9 +146,9 @@ def test_the_ratio_of_elements_is_below_the_smallest_eigenvalue(walled, method):
 def test_an_axis_that_nothing_spans_stays_zero():
     row = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
     network = bonded_contacts(row, 0.1)
-    points = conductivity_curve(network, [0.05, 0.1, 0.2, 0.3])
+    points = conductivity_curve(medium_of(network), [0.05, 0.1, 0.2, 0.3])
     for angle, point in zip([0.05, 0.1, 0.2, 0.3], points, strict=True):
-        exact = effective_conductivity(network.with_half_angle(angle))
+        exact = effective_conductivity(medium_of(network.with_half_angle(angle)))
         assert point.missing_axes == exact.missing_axes == "y"
         np.testing.assert_allclose(point.tensor, exact.tensor, rtol=1e-9)
 
@@ -154,8 +161,8 @@ def test_a_load_that_drives_nothing_has_no_energy(axis):
     chain = ParticlePacking(centers, np.full(4, 0.125), Box((1.0, 1.0), (True, True)))
     network, kappa = bonded_contacts(chain, 0.1), np.array([1.0, 2.0, 0.5, 3.0])
     angles = [0.05, 0.1, 0.2, 0.3, 0.4]
-    for angle, point in zip(angles, conductivity_curve(network, angles, conductivity=kappa), strict=True):
-        exact = effective_conductivity(network.with_half_angle(angle), conductivity=kappa)
+    for angle, point in zip(angles, conductivity_curve(medium_of(network, kappa), angles), strict=True):
+        exact = effective_conductivity(medium_of(network.with_half_angle(angle), kappa))
         assert point.missing_axes == exact.missing_axes != ""
         np.testing.assert_allclose(point.tensor, exact.tensor, rtol=1e-8, atol=1e-12)
 

@@ -28,16 +28,6 @@ ORDER = (
     ("cli",),
 )
 RANK = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
-OPEN = {  # engines that still import another; the medium rebuild closes these
-    ("engines/dtem/effective.py", "etc_engine.engines.pipe.conductances"),
-    ("engines/pipe/conductances.py", "etc_engine.engines.dtem.steady"),
-    ("engines/pipe/field.py", "etc_engine.engines.dtem.field"),
-    ("engines/pipe/field.py", "etc_engine.engines.dtem.steady"),
-    ("engines/pipe/steady.py", "etc_engine.engines.dtem.element"),
-    ("engines/pipe/steady.py", "etc_engine.engines.dtem.field"),
-    ("engines/pipe/steady.py", "etc_engine.engines.dtem.steady"),
-    ("engines/pipe/transient.py", "etc_engine.engines.dtem.storage"),
-}
 # the one outside library that only one place may import, at any level
 KEEPERS = {
     "mpi4py": {"sweep/scheduler.py"},
@@ -88,11 +78,7 @@ def test_each_room_imports_only_from_its_left_and_from_leaves(path):
             continue
         other = place_of(name)
         if other[0] == "engines" and own == "engines":
-            assert (
-                len(other) == 1
-                or other == mine
-                or any((path, part) in OPEN for part in (name, name.rpartition(".")[0]))
-            ), f"{path} imports another engine: {name}"
+            assert len(other) == 1 or other == mine, f"{path} imports another engine: {name}"
         elif other[0] in LEAVES and (own not in LEAVES or other[0] in ("errors", "box")):
             continue
         elif other[0] != own:

@@ -8,21 +8,24 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import conductivity_bounds, effective_conductivity
+from etc_engine.engines.dtem.conductivity import conductivity_bounds, element_conductivity
 from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
 from etc_engine.engines.dtem.exact.element import cut_chords, of_disk
 from etc_engine.engines.dtem.exact.jumps import _least_extension, jump_energies
 from etc_engine.engines.dtem.exact.lune import chord_points
 from etc_engine.engines.dtem.exact.waves import chord_trace, chord_waves, temperature_at
 from etc_engine.errors import InputError
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 TRUTH = 0.2787774  # corner-graded finite elements between energy bounds 1e-7 apart
 
 
-def bounds_of(network, modes, **options):
-    return conductivity_bounds(effective_conductivity(network, method="exact", modes=modes, axes=(0,), **options))[0]
+def bounds_of(network, modes, conductivity=1.0, **options):
+    medium = medium_of(network, conductivity)
+    return element_conductivity(medium, method="exact", modes=modes, axes=(0,), **options).bounds[0]
 
 
 def test_bounds_contain_the_truth_of_the_twelve_particles_and_tighten(feng_particles):
@@ -41,7 +44,7 @@ def test_bounds_contain_the_truth_of_the_twelve_particles_and_tighten(feng_parti
 @pytest.mark.parametrize("degrees", [3.0, 15.0, 25.0, 29.0])
 def test_bounds_of_a_bonded_lattice_contain_the_converged_value(hexagonal, degrees):
     network = bonded_contacts(hexagonal(), np.radians(degrees))
-    best = effective_conductivity(network, method="exact", modes=10).tensor[0, 0]
+    best = effective_conductivity(medium_of(network), method="exact", modes=10).tensor[0, 0]
     for modes in (1, 2, 3, 4, 6):
         low, high = bounds_of(network, modes)
         assert low < best < high
@@ -57,7 +60,7 @@ def test_bounds_of_random_disks_contain_the_converged_value():
             Box((1.0, 1.0), (periodic, periodic)),
         )
         network, kappa = overlap_contacts(packing), rng.uniform(1.0, 5.0, 25)
-        best = effective_conductivity(network, method="exact", modes=9, conductivity=kappa).tensor[0, 0]
+        best = effective_conductivity(medium_of(network, kappa), method="exact", modes=9).tensor[0, 0]
         for modes in (1, 3, 5):
             low, high = bounds_of(network, modes, conductivity=kappa)
             assert low < best < high
@@ -84,13 +87,13 @@ def test_bounds_scale_with_the_conductivity(feng_particles):
 def test_contact_resistance_leaves_no_jump_in_the_mean():
     """A chain with wide resistances: the bounds close as without them."""
     chain = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
-    low, high = bounds_of(bonded_contacts(chain, 0.3), 4, contact_resistance=2.0)
+    low, high = bounds_of(bonded_contacts(chain, 0.3).with_resistance(2.0), 4)
     assert 0.0 < high - low < 1e-6 * high
 
 
 def test_other_methods_have_no_bounds(feng_particles):
     with pytest.raises(InputError, match="bounds come with method exact, found a solution by chord"):
-        conductivity_bounds(effective_conductivity(overlap_contacts(feng_particles), axes=(0,)))
+        conductivity_bounds(effective_conductivity(medium_of(overlap_contacts(feng_particles)), axes=(0,)))
 
 
 def test_nothing_that_spans_is_between_zero_and_zero():
@@ -104,7 +107,7 @@ def test_nothing_that_spans_is_between_zero_and_zero():
 def loaded_disk(solution, p):
     """Chords of one disk and the waves of its fluxes."""
     sides = solution.sides
-    chords = cut_chords(sides, solution.material, modes=solution.modes)
+    chords = cut_chords(sides, solution.medium.conductivity, modes=solution.modes)
     points = chord_points(chords.levels)
     theta, alpha, exponents, levels = of_disk(chords, p)
     rows = chords.rows[chords.offsets[p] : chords.offsets[p + 1]]
@@ -118,7 +121,7 @@ def loaded_disk(solution, p):
 
 @pytest.fixture(scope="module")
 def solution(feng_particles):
-    return effective_conductivity(overlap_contacts(feng_particles), method="exact", axes=(0,)).solutions[0]
+    return effective_conductivity(medium_of(overlap_contacts(feng_particles)), method="exact", axes=(0,)).solutions[0]
 
 
 @pytest.mark.parametrize("p", [0, 3, 6])

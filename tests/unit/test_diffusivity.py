@@ -7,6 +7,7 @@ from scipy.special import erfc
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.laws.disk import chord_resistance
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts
 from etc_engine.packing import ParticlePacking
 from etc_engine.transient.diffusivity import SHORT, effective_diffusivity, fit_diffusivity, slab_mean
@@ -44,13 +45,17 @@ def test_fit_finds_the_diffusivity_and_its_misfit():
 def test_a_row_of_disks_becomes_a_slab():
     """Half-cells at walls and cells in between: a finite-volume slab, off by the square of the cell."""
     # the wide arcs of a periodic image above and below do not touch: the row conducts along x alone
-    errors = [found.transient / found.steady - 1.0 for n in (10, 20, 40) for found in [effective_diffusivity(row(n))]]
+    errors = [
+        found.transient / found.steady - 1.0
+        for n in (10, 20, 40)
+        for found in [effective_diffusivity(medium_of(row(n), heat_capacity=1.0))]
+    ]
     assert abs(errors[-1]) < 1e-3
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.2)
 
 
 def test_steady_diffusivity_by_hand():
-    found = effective_diffusivity(row(20), conductivity=3.0, heat_capacity=2.0, contact_resistance=0.1)
+    found = effective_diffusivity(medium_of(row(20).with_resistance(0.1), 3.0, heat_capacity=2.0))
     pipe = 2.0 * chord_resistance(0.1) / 3.0 + 0.1
     k = 20.0 / (19 * pipe + 2 * (chord_resistance(0.1) / 3.0 + 0.1))
     assert found.conductivity == pytest.approx(k, rel=1e-10)
@@ -63,7 +68,7 @@ def test_steady_diffusivity_by_hand():
 def test_what_has_no_diffusivity():
     with pytest.raises(InputError, match="periodic along x"):
         packing = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, False)))
-        effective_diffusivity(bonded_contacts(packing, 0.1))
+        effective_diffusivity(medium_of(bonded_contacts(packing, 0.1), heat_capacity=1.0))
     apart = ParticlePacking([[0.25, 0.5], [0.8, 0.5]], [0.25, 0.1], Box((1.0, 1.0)))
     with pytest.raises(InputError, match="no path of contacts"):
-        effective_diffusivity(bonded_contacts(apart, 0.1))
+        effective_diffusivity(medium_of(bonded_contacts(apart, 0.1), heat_capacity=1.0))

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.closed_form import closed_form_elements
-from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
-from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.methods import METHODS
 from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.laws.disk import SELF_RESISTANCE, mutual_resistance, self_resistance
-from etc_engine.medium.backbone import load_groups
+from etc_engine.laws.disk import SELF_RESISTANCE, mutual_resistance, position_angles, self_resistance
+from etc_engine.medium.loads import load_groups
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 
 def random_disks(seed: int, periodic: tuple[bool, bool] = (False, False), count: int = 60) -> ParticlePacking:
@@ -42,14 +42,13 @@ def literature_element(theta, alpha, method):
 def test_element_equals_the_literature_form_is_symmetric_and_semi_definite(feng_particles, method):
     network = overlap_contacts(feng_particles)
     sides = contact_sides(network)
-    elements = closed_form_elements(
-        sides, Material(np.ones(12), np.zeros(network.count + network.walls.size)), method=method
-    )
+    elements = METHODS[method].elements(sides, np.ones(12), 1)
+    theta = position_angles(sides.arms)
     for p in range(12):
         rows = slice(elements.offsets[p], elements.offsets[p + 1])
         n = rows.stop - rows.start
         K = elements.values[elements.starts[p] : elements.starts[p + 1]].reshape(n, n)
-        expected, _ = literature_element(sides.theta[rows], sides.alpha[rows], method)
+        expected, _ = literature_element(theta[rows], sides.alpha[rows], method)
         np.testing.assert_allclose(K, expected, atol=1e-13)
         np.testing.assert_allclose(K, K.T, atol=1e-16)
         np.testing.assert_allclose(K.sum(axis=1), 0.0, atol=1e-14)
@@ -64,7 +63,7 @@ def test_straight_chain_between_walls_is_a_series_of_two_contact_disks(method, c
     centers = [[(2 * i + 1) * radius, 0.5] for i in range(count)]
     network = bonded_contacts(ParticlePacking(centers, [radius] * count, Box((1.0, 1.0))), alpha)
     disk = 2.0 * (self_resistance(alpha, method) - mutual_resistance(np.pi, alpha, alpha)) / kappa
-    result = effective_conductivity(network, method=method, conductivity=kappa, axes=(0,))
+    result = effective_conductivity(medium_of(network, kappa), method=method, axes=(0,))
     assert result.tensor[0, 0] == pytest.approx(1.0 / (count * disk), rel=1e-12)
     field = recover_field(result.solutions[0])
     np.testing.assert_allclose(field.particle_temperatures, 1 - (2 * np.arange(count) + 1) / (2 * count), rtol=1e-12)
@@ -72,22 +71,24 @@ def test_straight_chain_between_walls_is_a_series_of_two_contact_disks(method, c
 
 def test_conductivity_scales_with_the_particles():
     network = overlap_contacts(random_disks(3))
-    one = effective_conductivity(network, axes=(0,)).tensor[0, 0]
-    seven = effective_conductivity(network, conductivity=7.0, axes=(0,)).tensor[0, 0]
+    one = effective_conductivity(medium_of(network), axes=(0,)).tensor[0, 0]
+    seven = effective_conductivity(medium_of(network, 7.0), axes=(0,)).tensor[0, 0]
     assert seven == pytest.approx(7.0 * one, rel=1e-13)
 
 
 def test_size_of_the_unit_of_length_does_not_matter():
     packing = random_disks(4)
     scaled = ParticlePacking(packing.centers * 37.0, packing.radii * 37.0, Box((37.0, 37.0)))
-    one, other = (effective_conductivity(overlap_contacts(p)).tensor for p in (packing, scaled))
+    one, other = (effective_conductivity(medium_of(overlap_contacts(p))).tensor for p in (packing, scaled))
     np.testing.assert_allclose(np.diag(one), np.diag(other), rtol=1e-10)
 
 
 def test_order_of_the_particles_does_not_matter():
     packing = random_disks(5)
     order = np.random.default_rng(11).permutation(packing.count)
-    one, other = (effective_conductivity(overlap_contacts(p)).tensor for p in (packing, packing.select(order)))
+    one, other = (
+        effective_conductivity(medium_of(overlap_contacts(p))).tensor for p in (packing, packing.select(order))
+    )
     np.testing.assert_allclose(np.diag(one), np.diag(other), rtol=1e-12)
 
 
@@ -96,13 +97,13 @@ def test_quarter_turn_swaps_the_axes():
     turned = ParticlePacking(
         np.stack([1.0 - packing.centers[:, 1], packing.centers[:, 0]], axis=1), packing.radii, packing.box
     )
-    one, other = (effective_conductivity(overlap_contacts(p)).tensor for p in (packing, turned))
+    one, other = (effective_conductivity(medium_of(overlap_contacts(p))).tensor for p in (packing, turned))
     np.testing.assert_allclose(np.diag(one), np.diag(other)[::-1], rtol=1e-11)
 
 
 def test_energy_equals_both_wall_flows_and_temperatures_obey_the_maximum_principle():
-    result = effective_conductivity(overlap_contacts(random_disks(7, count=400)), axes=(0,))
-    heat_in, heat_out = wall_heat_flows(result.solutions[0])
+    result = effective_conductivity(medium_of(overlap_contacts(random_disks(7, count=400))), axes=(0,))
+    heat_in, heat_out = result.solutions[0].wall_heat()
     assert heat_in == pytest.approx(result.tensor[0, 0], rel=1e-10)
     assert heat_out == pytest.approx(result.tensor[0, 0], rel=1e-10)
     field = recover_field(result.solutions[0])
@@ -115,7 +116,8 @@ def test_methods_keep_their_order():
     """The uniform-flux resistance is the largest, the chord's the smallest."""
     network = overlap_contacts(random_disks(8))
     values = [
-        effective_conductivity(network, method=m, axes=(0,)).tensor[0, 0] for m in ("standard", "enhanced", "chord")
+        effective_conductivity(medium_of(network), method=m, axes=(0,)).tensor[0, 0]
+        for m in ("standard", "enhanced", "chord")
     ]
     assert values == sorted(values)
 
@@ -127,7 +129,10 @@ def test_dead_ends_change_nothing_and_take_the_temperature_of_their_contact():
     box = Box((1.0, 1.0))
     bare = bonded_contacts(ParticlePacking(chain, [0.25, 0.25], box), alpha)
     hung = bonded_contacts(ParticlePacking([*chain, [0.25, 0.85], [0.25, 0.975]], [0.25, 0.25, 0.1, 0.025], box), alpha)
-    one, other = effective_conductivity(bare, axes=(0,)), effective_conductivity(hung, axes=(0,))
+    one, other = (
+        effective_conductivity(medium_of(bare), axes=(0,)),
+        effective_conductivity(medium_of(hung), axes=(0,)),
+    )
     assert hung.count == 3
     assert other.unknowns == one.unknowns == 1
     assert other.tensor[0, 0] == one.tensor[0, 0]
@@ -138,7 +143,7 @@ def test_dead_ends_change_nothing_and_take_the_temperature_of_their_contact():
 
 def test_no_path_means_zero_and_says_so():
     packing = ParticlePacking([[0.2, 0.5], [0.8, 0.5]], [0.2, 0.2], Box((1.0, 1.0)))
-    result = effective_conductivity(bonded_contacts(packing, 0.1))
+    result = effective_conductivity(medium_of(bonded_contacts(packing, 0.1)))
     assert np.diag(result.tensor).tolist() == [0.0, 0.0]
     assert result.spans == (False, False)
     assert result.missing_axes == "xy"
@@ -149,7 +154,7 @@ def test_no_path_means_zero_and_says_so():
 def test_single_disk_bridges_both_walls():
     packing = ParticlePacking([[0.5, 0.5]], [0.52], Box((1.0, 1.0)))
     alpha = np.arccos(0.5 / 0.52)
-    result = effective_conductivity(overlap_contacts(packing), axes=(0,))
+    result = effective_conductivity(medium_of(overlap_contacts(packing)), axes=(0,))
     disk = 2.0 * (self_resistance(alpha, "chord") - mutual_resistance(np.pi, alpha, alpha))
     assert result.unknowns == 0
     assert result.tensor[0, 0] == pytest.approx(1.0 / disk, rel=1e-12)
@@ -160,7 +165,7 @@ def test_single_disk_bridges_both_walls():
 
 @pytest.mark.parametrize(("degrees", "exact", "error"), [(5, 0.62564, 5e-4), (10, 0.74811, 3e-3), (15, 0.84357, 9e-3)])
 def test_bonded_hexagonal_lattice_is_isotropic_and_near_exact(hexagonal, degrees, exact, error):
-    tensor = effective_conductivity(bonded_contacts(hexagonal(), np.radians(degrees))).tensor
+    tensor = effective_conductivity(medium_of(bonded_contacts(hexagonal(), np.radians(degrees)))).tensor
     np.testing.assert_allclose(tensor, tensor[0, 0] * np.eye(2), atol=1e-14)
     assert tensor[0, 0] == pytest.approx(exact, rel=error)
 
@@ -171,7 +176,7 @@ def test_replicas_of_a_periodic_box_agree(repeats):
     nx, ny = repeats
     copies = [packing.centers + [i, j] for i in range(nx) for j in range(ny)]
     bigger = ParticlePacking(np.concatenate(copies), np.tile(packing.radii, nx * ny), Box((nx, ny), (True, True)))
-    one, other = (effective_conductivity(overlap_contacts(p)).tensor for p in (packing, bigger))
+    one, other = (effective_conductivity(medium_of(overlap_contacts(p))).tensor for p in (packing, bigger))
     np.testing.assert_allclose(one, other, atol=1e-13)
     assert one[0, 1] == one[1, 0] != 0.0
 
@@ -179,7 +184,7 @@ def test_replicas_of_a_periodic_box_agree(repeats):
 def test_translation_of_a_periodic_box_does_not_matter():
     packing = random_disks(22, (True, True), 36)
     moved = ParticlePacking(packing.centers + [0.37, 0.81], packing.radii, packing.box)
-    one, other = (effective_conductivity(overlap_contacts(p)).tensor for p in (packing, moved))
+    one, other = (effective_conductivity(medium_of(overlap_contacts(p))).tensor for p in (packing, moved))
     np.testing.assert_allclose(one, other, atol=1e-13)
 
 
@@ -194,7 +199,7 @@ def test_periodic_axis_beside_walls():
         0.1,
     )
     assert load_groups(network.packing.box) == ((0,), (1,))
-    tensor = effective_conductivity(network).tensor
+    tensor = effective_conductivity(medium_of(network)).tensor
     assert tensor[0, 0] == pytest.approx(tensor[1, 1], rel=1e-12)
     assert np.isnan(tensor[0, 1])
 
@@ -203,12 +208,12 @@ def test_single_periodic_disk_touches_its_own_images():
     network = bonded_contacts(ParticlePacking([[0.3, 0.9]], [0.5], Box((1.0, 1.0), (True, True))), 0.2)
     assert network.count == 2
     disk = 2.0 * (self_resistance(0.2, "chord") - mutual_resistance(np.pi, 0.2, 0.2))
-    np.testing.assert_allclose(effective_conductivity(network).tensor, np.eye(2) / disk, atol=1e-14)
+    np.testing.assert_allclose(effective_conductivity(medium_of(network)).tensor, np.eye(2) / disk, atol=1e-14)
 
 
 def test_periodic_temperatures_follow_the_gradient(hexagonal):
     packing = hexagonal(3, 2)
-    solution = effective_conductivity(bonded_contacts(packing, 0.1)).solutions[0]
+    solution = effective_conductivity(medium_of(bonded_contacts(packing, 0.1))).solutions[0]
     for load in (0, 1):
         field = recover_field(solution, load)
         difference = field.particle_temperatures - packing.centers[:, load]
@@ -223,9 +228,9 @@ def test_contact_resistance_adds_to_a_chain():
     packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
     network = bonded_contacts(packing, alpha)
     disk = 2.0 * (self_resistance(alpha, "chord") - mutual_resistance(np.pi, alpha, alpha))
-    result = effective_conductivity(network, contact_resistance=resistance, axes=(0,))
+    result = effective_conductivity(medium_of(network.with_resistance(resistance)), axes=(0,))
     assert result.tensor[0, 0] == pytest.approx(1.0 / (2.0 * disk + 3.0 * resistance), rel=1e-12)
-    per_contact = effective_conductivity(network, contact_resistance=[0.7, 0.0, 0.2], axes=(0,))
+    per_contact = effective_conductivity(medium_of(network.with_resistance([0.7, 0.0, 0.2])), axes=(0,))
     assert per_contact.tensor[0, 0] == pytest.approx(1.0 / (2.0 * disk + 0.9), rel=1e-12)
 
 
@@ -233,7 +238,7 @@ def test_mixed_conductivities_add_in_a_chain():
     alpha = 0.1
     packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
     disk = 2.0 * (self_resistance(alpha, "chord") - mutual_resistance(np.pi, alpha, alpha))
-    result = effective_conductivity(bonded_contacts(packing, alpha), conductivity=[1.0, 4.0], axes=(0,))
+    result = effective_conductivity(medium_of(bonded_contacts(packing, alpha), [1.0, 4.0]), axes=(0,))
     assert result.tensor[0, 0] == pytest.approx(1.0 / (disk * 1.25), rel=1e-12)
 
 
@@ -243,19 +248,19 @@ def test_mixed_conductivities_add_in_a_chain():
 def test_overlapping_arcs_are_refused_with_the_particle():
     packing = ParticlePacking([[0.5, 0.5], [0.85, 0.5], [0.7, 0.8]], [0.2, 0.15, 0.16], Box((1.0, 1.0)))
     with pytest.raises(GeometryError, match=r"two contact arcs of particle \d overlap"):
-        solve_steady(bonded_contacts(packing, np.radians(60.0), bond_gap=0.5), (0,))
+        solve_steady(medium_of(bonded_contacts(packing, np.radians(60.0), bond_gap=0.5)), (0,))
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_bad_conductivities_are_refused(value):
     network = overlap_contacts(random_disks(9))
-    with pytest.raises(InputError, match="conductivity must be positive and finite"):
-        effective_conductivity(network, conductivity=value)
+    with pytest.raises(InputError, match=r"must (be positive and finite|not be negative)"):
+        effective_conductivity(medium_of(network, value))
 
 
 def test_wrong_number_of_conductivities_is_refused():
     with pytest.raises(InputError, match=r"shape \(64,\), found \(3,\)"):
-        effective_conductivity(overlap_contacts(random_disks(9)), conductivity=[1.0, 2.0, 3.0])
+        effective_conductivity(medium_of(overlap_contacts(random_disks(9)), [1.0, 2.0, 3.0]))
 
 
 def test_a_row_that_wraps_around_one_axis_conducts_nothing_along_the_other():
@@ -263,7 +268,7 @@ def test_a_row_that_wraps_around_one_axis_conducts_nothing_along_the_other():
     row = [[0.1 + 0.2 * i, 0.5 + 0.01 * (-1) ** i] for i in range(10)]
     packing = ParticlePacking(row, [0.11] * 10, Box((2.0, 1.0), (True, True)))
     for method in ("chord", "arc"):
-        result = effective_conductivity(overlap_contacts(packing), method=method)
+        result = effective_conductivity(medium_of(overlap_contacts(packing)), method=method)
         assert result.spans == (True, False)
         assert result.tensor[0, 0] > 0.0
         assert result.tensor[1].tolist() == result.tensor[:, 1].tolist() == [0.0, 0.0]

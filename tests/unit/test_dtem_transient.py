@@ -12,19 +12,20 @@ from scipy.linalg import expm
 from scipy.special import jn_zeros, jnp_zeros
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.methods import find_method
 from etc_engine.engines.dtem.steady import solve_steady
-from etc_engine.engines.dtem.storage import readings_of_parts, stored_areas, storing_elements
-from etc_engine.engines.dtem.transient import contact_flows, transient_system
+from etc_engine.engines.dtem.storage import readings_of_parts, storing_elements
+from etc_engine.engines.dtem.transient import dipole_amplitudes
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.disk import mutual_resistance, self_resistance
 from etc_engine.medium.backbone import find_backbone
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.sides import ContactSides
 from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import SCHEMES, critical_step, march
 from etc_engine.structure.union import union_area
 
@@ -33,21 +34,21 @@ METHODS = ("chord", "standard", "enhanced", "arc")
 STEP = {"left": FixedTemperature(1.0), "right": FixedTemperature(0.0)}
 
 
-def one_disk(theta, alpha) -> ContactSides:
+def one_disk(theta, alpha, resistance=0.0) -> ContactSides:
     """Sides of a single disk with contacts that lead to walls."""
     theta, alpha = np.asarray(theta, dtype=float), np.broadcast_to(np.asarray(alpha, dtype=float), len(theta)).copy()
     n = theta.size
     arms = np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    no_contacts = np.zeros((0, 2), dtype=np.int64)
     return ContactSides(
-        np.array([0, n]), np.arange(n), arms, theta, alpha, np.zeros((0, 2), dtype=np.int64), np.arange(n), np.ones(1)
+        np.array([0, n]), np.arange(n), arms, alpha, np.full(n, resistance), np.ones(1), no_contacts, np.arange(n)
     )
 
 
 def blocks(theta, alpha, method, dipoles, kappa=1.0, resistance=0.0, modes=None):
     """K_cc, K_cs, K_ss of the storing element of one disk."""
-    sides = one_disk(theta, alpha)
-    material = Material(np.array([kappa]), np.full(len(theta), resistance))
-    elements = storing_elements(sides, material, method, dipoles=dipoles, modes=modes)
+    sides = one_disk(theta, alpha, resistance)
+    elements = storing_elements(sides, np.array([kappa]), method, dipoles=dipoles, modes=modes)
     size = elements.offsets[-1]
     K = elements.values.reshape(size, size)
     n = size - (3 if dipoles else 1)
@@ -115,8 +116,7 @@ def test_element_is_symmetric_semi_definite_and_at_rest_the_steady_one(method, d
     np.testing.assert_allclose(K @ common, 0.0, atol=1e-11 * np.abs(K).max())
     if arcs[0].size < 2:
         return
-    sides = one_disk(*arcs)
-    steady = find_method(method).elements(sides, Material(np.array([kappa]), np.full(arcs[0].size, resistance)), modes)
+    steady = find_method(method).elements(one_disk(*arcs, resistance), np.array([kappa]), modes)
     at_rest = K_cc - K_cs @ np.linalg.solve(K_ss, K_cs.T)
     np.testing.assert_allclose(at_rest.ravel(), steady.values, atol=1e-11 * np.abs(K).max())
 
@@ -227,15 +227,15 @@ def test_at_large_times_it_is_the_steady_method(random_network, feng_particles, 
         rng = np.random.default_rng(3)
         kappa = rng.uniform(0.5, 2.0, network.packing.count)
         resistance = rng.uniform(0.0, 0.5, network.count + network.walls.size)
-        given_material = {"conductivity": kappa, "contact_resistance": resistance}
-        system = transient_system(network, STEP, method=method, dipoles=dipoles, **given_material)
+        medium = medium_of(network.with_resistance(resistance), kappa, heat_capacity=1.0)
+        system = transient_system(medium, STEP, method=method, dipoles=dipoles)
         *_, late = march(system.heat, system.initial(0.3), [0.0, 1e7], steps=5, scheme="backward-euler")
-        solution = solve_steady(network, (0,), method=method, tolerance=1e-12, **given_material)
+        solution = solve_steady(medium, (0,), method=method, tolerance=1e-12)
         steady = recover_field(solution)
         known = np.isfinite(steady.particle_temperatures)
         found = system.particle_temperatures(late.temperatures)
         np.testing.assert_allclose(found[known], steady.particle_temperatures[known], atol=1e-8)
-        flows = contact_flows(system, late.time, late.temperatures)
+        flows = system.flows(late.time, late.temperatures)
         np.testing.assert_allclose(flows[system.sides.of_contacts[:, 1]], steady.contact_flows, atol=1e-8)
         left = system.heat.rates(late.time, late.temperatures)[0]
         assert left == pytest.approx(solution.energies[0, 0], rel=1e-8)
@@ -251,7 +251,12 @@ def test_energy_balance_of_every_scheme_with_all_kinds_of_walls(feng_particles, 
         "top": Insulated(),
     }
     network = overlap_contacts(feng_particles)
-    system = transient_system(network, walls, dipoles=dipoles, source=lambda t: np.full(12, 0.1 * t))
+    system = transient_system(
+        medium_of(network, heat_capacity=1.0),
+        walls,
+        dipoles=dipoles,
+        source=lambda t: np.full(12, 0.1 * t),
+    )
     control = {"steps": 20}
     if scheme == "adaptive":
         control = {"tolerance": 1e-3}
@@ -261,7 +266,7 @@ def test_energy_balance_of_every_scheme_with_all_kinds_of_walls(feng_particles, 
     for state in march(system.heat, system.initial(lambda x: x[:, 0]), times, scheme=scheme, **control):
         assert abs(state.imbalance) < 1e-12
     means = system.particle_temperatures(state.temperatures) - feng_particles.centers[:, 0]
-    assert stored_areas(network, "chord") @ means == pytest.approx(state.stored, abs=1e-12)
+    assert network.cut_measures(prescribed=True) @ means == pytest.approx(state.stored, abs=1e-12)
     assert np.all(state.heat[[0, 2, 4]] != 0.0)
 
 
@@ -269,11 +274,11 @@ def test_contact_flows_feed_the_particles(random_network):
     """Equal and opposite at a contact; with the source they are what each particle stores."""
     network = random_network
     source = np.linspace(0.0, 1.0, network.packing.count)
-    capacity = 2.0 * stored_areas(network, "chord")
+    capacity = 2.0 * network.cut_measures(prescribed=True)
     for dipoles in (False, True):
-        system = transient_system(network, STEP, dipoles=dipoles, heat_capacity=2.0, source=source)
+        system = transient_system(medium_of(network, heat_capacity=2.0), STEP, dipoles=dipoles, source=source)
         *_, state = march(system.heat, system.initial(0.0), [0.0, 0.01], scheme="adaptive", tolerance=1e-5)
-        flows = contact_flows(system, state.time, state.temperatures)
+        flows = system.flows(state.time, state.temperatures)
         np.testing.assert_allclose(flows[system.sides.of_contacts].sum(axis=1), 0.0, atol=1e-11)
         into = np.bincount(system.sides.particles, flows, minlength=network.packing.count) + source
         slope = system.heat.slope(state.time, state.temperatures)[-capacity.size * system.states :]
@@ -291,7 +296,9 @@ def test_plates_of_walls_come_to_rest_as_resistances_in_series():
     walls = {"left": HeatFlux(q), "right": Convective(film, ambient)}
     half = (self_resistance(alpha, "chord") - mutual_resistance(np.pi, alpha, alpha)) / kappa  # centre to contact
     for dipoles in (False, True):
-        system = transient_system(network, walls, dipoles=dipoles, conductivity=kappa, contact_resistance=contact)
+        system = transient_system(
+            medium_of(network.with_resistance(contact), kappa, heat_capacity=1.0), walls, dipoles=dipoles
+        )
         *_, late = march(system.heat, system.initial(0.0), [0.0, 1e6], steps=5, scheme="backward-euler")
         heat = 2.0 * q
         last = ambient + heat / (2.0 * film) + heat * (contact + half)
@@ -302,12 +309,14 @@ def test_plates_of_walls_come_to_rest_as_resistances_in_series():
 
 def test_particles_without_contacts_keep_their_heat_and_a_source_warms_them():
     packing = ParticlePacking([[0.1, 0.1], [0.5, 0.5]], [0.1, 0.2], Box((2.0, 2.0)))
-    system = transient_system(bonded_contacts(packing, 0.1), {}, dipoles=True, source=[0.0, 1.0])
+    system = transient_system(
+        medium_of(bonded_contacts(packing, 0.1), heat_capacity=1.0), {}, dipoles=True, source=[0.0, 1.0]
+    )
     *_, late = march(system.heat, system.initial([5.0, 1.0]), [0.0, 0.3], steps=10)
     np.testing.assert_allclose(
         system.particle_temperatures(late.temperatures), [5.0, 1.0 + 0.3 / (0.04 * np.pi)], rtol=1e-12
     )
-    np.testing.assert_allclose(system.dipoles(late.temperatures), 0.0, atol=1e-12)
+    np.testing.assert_allclose(dipole_amplitudes(system, late.temperatures), 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("dipoles", [False, True])
@@ -315,8 +324,8 @@ def test_units_scale_out(feng_particles, dipoles):
     """T depends on kappa t/(rho c R^2) alone: another unit of length, another material."""
     scaled = ParticlePacking(feng_particles.centers * 40.0, feng_particles.radii * 40.0, Box((40.0, 40.0)))
     systems = (
-        transient_system(overlap_contacts(feng_particles), STEP, dipoles=dipoles),
-        transient_system(overlap_contacts(scaled), STEP, dipoles=dipoles, conductivity=7.0, heat_capacity=0.2),
+        transient_system(medium_of(overlap_contacts(feng_particles), heat_capacity=1.0), STEP, dipoles=dipoles),
+        transient_system(medium_of(overlap_contacts(scaled), 7.0, heat_capacity=0.2), STEP, dipoles=dipoles),
     )
     ends = []
     for system, span in zip(systems, (0.02, 0.02 * 0.2 / 7.0 * 1600.0), strict=True):
@@ -335,10 +344,10 @@ def test_turned_packing_has_turned_temperatures(feng_particles, dipoles):
     ends = []
     for packing, walls in ((feng_particles, ("left", "right")), (turned, ("bottom", "top"))):
         conditions = dict(zip(walls, STEP.values(), strict=True))
-        system = transient_system(overlap_contacts(packing), conditions, dipoles=dipoles)
+        system = transient_system(medium_of(overlap_contacts(packing), heat_capacity=1.0), conditions, dipoles=dipoles)
         *_, last = march(system.heat, system.initial(0.0), [0.0, 0.02], steps=20)
         ends.append(last.temperatures)
-        amplitudes = system.dipoles(last.temperatures)
+        amplitudes = dipole_amplitudes(system, last.temperatures)
         ends.append(np.hypot(*amplitudes.T))
         ends[-2] = system.particle_temperatures(last.temperatures)
     np.testing.assert_allclose(ends[0], ends[2], atol=1e-12)
@@ -348,12 +357,12 @@ def test_turned_packing_has_turned_temperatures(feng_particles, dipoles):
 def test_periodic_row_of_two_disks_exchanges_heat_both_ways_round():
     box = Box((2.0, 3.0), (True, False))
     network = bonded_contacts(ParticlePacking([[0.5, 1.5], [1.5, 1.5]], [0.5, 0.5], box), 0.2)
-    system = transient_system(network, {})
+    system = transient_system(medium_of(network, heat_capacity=1.0), {})
     states = list(march(system.heat, system.initial([1.0, 0.0]), [0.0, 1.0, 2.0], scheme="adaptive", tolerance=1e-9))
     gaps = [float(np.diff(system.particle_temperatures(s.temperatures))[0]) for s in states]
     # S = Q_1 + Q_2 = 2 Q warms the disk; T_c - T_o = (h'_11 + h'_12) Q + S/(8 pi), both contacts at 1/2
     h = float(self_resistance(0.2, "chord") + mutual_resistance(np.pi, 0.2, 0.2)) - 2 * np.log(2) / np.pi
-    rate = 2.0 / (h + 1 / (4 * np.pi)) / stored_areas(network, "chord")[0]
+    rate = 2.0 / (h + 1 / (4 * np.pi)) / network.cut_measures(prescribed=True)[0]
     np.testing.assert_allclose(gaps, -np.exp(-rate * np.arange(3.0)), atol=1e-6)
 
 
@@ -363,21 +372,25 @@ def test_stored_areas_add_up_to_the_union(seed):
     rng = np.random.default_rng(seed)
     grid = np.stack(np.meshgrid(np.arange(5), np.arange(5), indexing="ij"), axis=-1).reshape(-1, 2) + 0.5
     packing = ParticlePacking((grid + 0.05 * rng.uniform(-1, 1, grid.shape)) / 5, np.full(25, 0.11), Box((1.0, 1.0)))
-    assert stored_areas(overlap_contacts(packing), "standard").sum() == pytest.approx(union_area(packing), rel=1e-12)
+    assert overlap_contacts(packing).cut_measures(prescribed=False).sum() == pytest.approx(
+        union_area(packing), rel=1e-12
+    )
 
 
 def test_prescribed_arcs_cut_disks_with_chord_only():
     network = bonded_contacts(ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0))), 0.3)
     whole = 0.25 * np.pi
-    assert stored_areas(network, "arc")[0] == pytest.approx(whole)
-    assert stored_areas(network, "chord")[0] == pytest.approx(whole - 4 * 0.25 * (0.3 - np.sin(0.3) * np.cos(0.3)))
+    assert network.cut_measures(prescribed=False)[0] == pytest.approx(whole)
+    assert network.cut_measures(prescribed=True)[0] == pytest.approx(
+        whole - 4 * 0.25 * (0.3 - np.sin(0.3) * np.cos(0.3))
+    )
 
 
 @pytest.mark.parametrize("dipoles", [False, True])
 def test_bigger_system_is_marched_by_multigrid(dipoles):
     spec = PackingSpec("advancing-front", parse_radii("uniform:0.0045:0.0075"), Box((1.0, 1.0)))
     network = bonded_contacts(pack(spec, np.random.default_rng(8)), 6 * DEGREE, 1e-3)
-    system = transient_system(network, STEP, dipoles=dipoles)
+    system = transient_system(medium_of(network, heat_capacity=1.0), STEP, dipoles=dipoles)
     assert system.heat.capacity.size > 20_000
     *_, state = march(system.heat, system.initial(0.0), [0.0, 0.004], steps=4, scheme="backward-euler")
     assert abs(state.imbalance) < 1e-12
@@ -391,20 +404,20 @@ def test_bigger_system_is_marched_by_multigrid(dipoles):
 def test_bad_input_is_refused(feng_particles):
     network = overlap_contacts(feng_particles)
     with pytest.raises(InputError, match="unknown wall 'middle'"):
-        transient_system(network, {"middle": Insulated()})
+        transient_system(medium_of(network, heat_capacity=1.0), {"middle": Insulated()})
     with pytest.raises(InputError, match="heat capacity must be positive"):
-        transient_system(network, STEP, heat_capacity=0.0)
+        transient_system(medium_of(network, heat_capacity=0.0), STEP)
     with pytest.raises(InputError, match="source must be one finite number or 12"):
-        transient_system(network, STEP, source=[1.0, 2.0])
+        transient_system(medium_of(network, heat_capacity=1.0), STEP, source=[1.0, 2.0])
     with pytest.raises(InputError, match="initial temperature must be one finite number or 12"):
-        transient_system(network, STEP).initial([1.0])
+        transient_system(medium_of(network, heat_capacity=1.0), STEP).initial([1.0])
     alone = bonded_contacts(ParticlePacking([[0.5, 0.5]], [0.2], Box((1.0, 1.0))), 0.1)
     with pytest.raises(InputError, match="no particle touches the left wall"):
-        transient_system(alone, {"left": HeatFlux(1.0)})
+        transient_system(medium_of(alone, heat_capacity=1.0), {"left": HeatFlux(1.0)})
 
 
 def test_results_do_not_depend_on_the_scheme(random_network):
-    system = transient_system(random_network, STEP, dipoles=True)
+    system = transient_system(medium_of(random_network, heat_capacity=1.0), STEP, dipoles=True)
     ends = []
     for scheme, control in (("bdf2", {"steps": 400}), ("adaptive", {"tolerance": 1e-6})):
         *_, last = march(system.heat, system.initial(0.0), [0.0, 0.02], scheme=scheme, **control)

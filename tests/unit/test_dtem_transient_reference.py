@@ -78,9 +78,9 @@ def test_the_reference_is_conservative_and_steady_at_the_end(study):
     _, steady = transient.run(cases.CASES[1], "chord with dipoles", fourier)
     np.testing.assert_allclose(means[-1], steady[-1], atol=1e-4)
     fourier, flows, means = transient.reference(cases.CASES[0])
-    from etc_engine.engines.dtem.storage import stored_areas
+    pass
 
-    areas = stored_areas(cases.CASES[0].network(), "chord")
+    areas = cases.CASES[0].network().cut_measures(prescribed=True)
     stored = means @ areas
     times = fourier * cases.CASES[0].radius ** 2
     # the flow falls smoothly: its integral between outputs, as a power law of the time

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import effective_conductivity
 from etc_engine.errors import InputError
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.dumps import count_frames, read_dump, write_dump
 from etc_engine.particle_files.sample import Sample
 from etc_engine.particle_files.table import ParticleTable
+from etc_engine.realization import effective_conductivity
 
 BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
 
@@ -50,8 +51,8 @@ def test_a_real_lammps_bed_brings_its_box():
 
 def test_floating_grains_of_the_bed_are_normal():
     """Before the fall nothing touches enough to conduct; after it the bed wraps around x."""
-    before = effective_conductivity(overlap_contacts(read_dump(BED, 0).packing), axes=(0,))
-    after = effective_conductivity(overlap_contacts(read_dump(BED, 1).packing), axes=(0,))
+    before = effective_conductivity(medium_of(overlap_contacts(read_dump(BED, 0).packing)), axes=(0,))
+    after = effective_conductivity(medium_of(overlap_contacts(read_dump(BED, 1).packing)), axes=(0,))
     assert (before.tensor[0, 0], before.spans[0]) == (0.0, False)
     assert after.spans[0]
     assert after.tensor[0, 0] > 0.01

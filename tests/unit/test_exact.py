@@ -7,18 +7,18 @@ from hypothesis import strategies as st
 from scipy.special import gammaln
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import effective_conductivity, wall_heat_flows
-from etc_engine.engines.dtem.element import Material
+from etc_engine.engines.dtem.conductivity import element_conductivity
 from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
 from etc_engine.engines.dtem.exact.element import edge_exponents, exact_elements
 from etc_engine.engines.dtem.exact.lune import LEVELS, chord_points, log_gamma, mode_weights
 from etc_engine.engines.dtem.field import recover_field
-from etc_engine.engines.dtem.interior import temperatures_inside
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.disk import mutual_resistance, self_resistance
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,10 @@ def resistances(theta, alpha, exponents, levels, modes, points):
     return h
 
 
-def exact(packing, *, contact_angle=None, **options):
+def exact(packing, *, contact_angle=None, conductivity=1.0, contact_resistance=0.0, **options):
     network = overlap_contacts(packing) if contact_angle is None else bonded_contacts(packing, contact_angle)
-    return effective_conductivity(network, method="exact", **options)
+    medium = medium_of(network.with_resistance(contact_resistance), conductivity)
+    return element_conductivity(medium, method="exact", **options)
 
 
 def jittered(seed: int, side: int, periodic=(False, False)) -> ParticlePacking:
@@ -98,12 +99,11 @@ def test_narrow_chords_far_apart_exchange_as_points_on_a_circle(points):
 def test_edge_exponents():
     packing = ParticlePacking([[0.25, 0.5], [0.72, 0.5]], [0.26, 0.25], Box((1.0, 1.0)))
     sides = contact_sides(overlap_contacts(packing))
-    resistance = np.zeros(5)
-    equal = edge_exponents(sides, Material(np.ones(2), resistance))
+    equal = edge_exponents(sides, np.ones(2))
     both = sides.of_contacts[0]
     np.testing.assert_allclose(equal[both], np.pi / (2 * np.pi - sides.alpha[both].sum()), rtol=1e-14)
     np.testing.assert_allclose(equal[sides.of_walls], 0.5 * np.pi / (np.pi - sides.alpha[sides.of_walls]), rtol=1e-14)
-    mixed = edge_exponents(sides, Material(np.array([1.0, 1e9]), resistance))
+    mixed = edge_exponents(sides, np.array([1.0, 1e9]))
     assert mixed[both[0]] == pytest.approx(0.5 * np.pi / (np.pi - sides.alpha[both[0]]), rel=1e-6)
 
 
@@ -146,7 +146,9 @@ def test_few_degrees_agree_with_the_chord_formula():
     """Exact for one isothermal chord and a far source."""
     packing = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0)))
     network = bonded_contacts(packing, np.radians(2.0))
-    one, other = (effective_conductivity(network, method=m, axes=(0,)).tensor[0, 0] for m in ("exact", "chord"))
+    one, other = (
+        effective_conductivity(medium_of(network), method=m, axes=(0,)).tensor[0, 0] for m in ("exact", "chord")
+    )
     assert one == pytest.approx(other, rel=1e-6)
 
 
@@ -162,7 +164,7 @@ def test_modes_converge_from_below(feng_particles):
 
 def test_heat_balances_and_temperatures_obey_the_maximum_principle():
     result = exact(jittered(7, 12), axes=(0,))
-    heat_in, heat_out = wall_heat_flows(result.solutions[0])
+    heat_in, heat_out = result.solutions[0].wall_heat()
     assert heat_in == pytest.approx(result.tensor[0, 0], rel=1e-9)
     assert heat_out == pytest.approx(result.tensor[0, 0], rel=1e-9)
     field = recover_field(result.solutions[0])
@@ -193,8 +195,7 @@ def test_replicas_of_a_periodic_box_agree():
 
 def test_two_builds_have_the_same_bits():
     sides = contact_sides(overlap_contacts(jittered(23, 6)))
-    material = Material(np.ones(36), np.zeros(sides.nodes.max() + 1))
-    one, other = exact_elements(sides, material), exact_elements(sides, material)
+    one, other = exact_elements(sides, np.ones(36)), exact_elements(sides, np.ones(36))
     np.testing.assert_array_equal(one.values, other.values)
 
 
@@ -229,8 +230,8 @@ def test_corner_outside_a_disk_that_both_walls_cut_is_refused():
 
 @pytest.mark.parametrize(("method", "modes"), [("chord", 2), ("exact", 0), ("exact", 99)])
 def test_modes_a_method_does_not_have_are_refused(feng_particles, method, modes):
-    with pytest.raises(InputError, match="flux mode"):
-        effective_conductivity(overlap_contacts(feng_particles), method=method, modes=modes)
+    with pytest.raises(InputError, match="modes"):
+        effective_conductivity(medium_of(overlap_contacts(feng_particles)), method=method, modes=modes)
 
 
 def test_temperature_inside_is_continuous_across_contacts_and_that_of_the_walls(feng_particles):
@@ -244,9 +245,9 @@ def test_temperature_inside_is_continuous_across_contacts_and_that_of_the_walls(
     for s in (-0.8, -0.3, 0.0, 0.6):
         middle = normals * (radii[i] * np.cos(network.angles[:, 0]))[:, None]
         place = middle + s * across * (radii[i] * np.sin(network.angles[:, 0]))[:, None]
-        one = temperatures_inside(solution, field, i, place)
-        other = temperatures_inside(solution, field, j, place + centers[i] - centers[j])
+        one = field.inside(i, place)
+        other = field.inside(j, place + centers[i] - centers[j])
         np.testing.assert_allclose(one, other, atol=5e-6)  # what six modes leave
     hot = network.wall_particles[network.walls == 0]
     at_wall = np.stack([-centers[hot, 0], np.full(hot.size, 0.004)], axis=1)
-    np.testing.assert_allclose(temperatures_inside(solution, field, hot, at_wall), 1.0, atol=5e-7)
+    np.testing.assert_allclose(field.inside(hot, at_wall), 1.0, atol=5e-7)

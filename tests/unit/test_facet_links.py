@@ -135,7 +135,7 @@ def test_walls_are_mirrors():
 def test_contact_resistance_blocks_the_disk_alone():
     packing = lattice("fcc", 2.0 * np.cos(np.radians(10.0)))
     network = overlap_contacts(packing)
-    links = {r: facet_links(network, r) for r in (0.0, 0.05, 1e9)}
+    links = {r: facet_links(network.with_resistance(r)) for r in (0.0, 0.05, 1e9)}
     k = {r: facet_conductivity(v, uniform_material(v, 100.0, 1.0)).tensor[0, 0] for r, v in links.items()}
     assert k[0.0] > k[0.05] > k[1e9]
     vacuum = [facet_conductivity(v, uniform_material(v, 100.0, 1e-6)).tensor[0, 0] for v in links.values()]
@@ -227,7 +227,7 @@ def test_hidden_spheres_and_bad_material_are_refused():
     with pytest.raises(InputError, match="pores that conduct"):
         facet_conductivity(links, uniform_material(links, 10.0, 0.0))
     with pytest.raises(InputError, match="contact resistance"):
-        facet_links(overlap_contacts(lattice("bcc", 2.01)), -1.0)
+        facet_links(overlap_contacts(lattice("bcc", 2.01)).with_resistance(-1.0))
 
 
 def test_rarefied_gas_goes_to_vacuum_and_to_the_continuum():

@@ -106,7 +106,7 @@ def test_the_centre_of_a_ball_follows_the_exact_series():
 def test_a_ball_of_contacts_has_the_ball_s_mass_and_surface():
     ball = ball_lattice(0.05, 500, np.random.default_rng(79), transmission="contact", coefficient=0.755)
     assert ball.volumes.sum() == pytest.approx(4.0 / 3.0 * np.pi * 0.05**3, rel=1e-12)
-    ends = ball.packing.centers[ball.wall_nodes] + ball.wall_crossings - 0.5 * np.asarray(ball.packing.box.lengths)
+    ends = ball.packing.centers[ball.wall_particles] + ball.wall_crossings - 0.5 * np.asarray(ball.packing.box.lengths)
     cut = np.linalg.norm(ends, axis=1)
     assert np.abs(cut / 0.05 - 1.0).max() < 0.003
     assert (np.abs(cut - 0.05) < 1e-12).mean() > 0.9

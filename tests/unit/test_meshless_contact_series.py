@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.transient import contact_flows, particle_sides, transient_system
+from etc_engine.engines.dtem.transient import contact_temperatures
 from etc_engine.engines.meshless import ContactArc, flow_histories, heat_disk_by_flows, heat_disk_through_arcs
-from etc_engine.engines.pipe.conductances import pipe_conductances
-from etc_engine.engines.pipe.flows import pipe_contact_flows
 from etc_engine.engines.pipe.steady import pipe_conductivity
-from etc_engine.engines.pipe.transient import pipe_transient
 from etc_engine.errors import InputError
+from etc_engine.laws.disk import position_angles
+from etc_engine.medium.conductances import contact_conductances
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts
-from etc_engine.medium.sides import contact_sides
+from etc_engine.medium.transient import particle_sides
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing import ParticlePacking
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import march
 
 ALPHA = np.radians(15.0)
@@ -34,18 +35,18 @@ def test_a_disk_of_a_march_is_truly_as_warm_as_the_elements_say(row):
     fourier = np.array([0.03, 0.3, 3.0])
     errors = {}
     for dipoles in (False, True):
-        system = transient_system(row, WALLS, method="standard", dipoles=dipoles)
+        system = transient_system(medium_of(row, heat_capacity=1.0), WALLS, method="standard", dipoles=dipoles)
         times = np.concatenate([[0.0], np.geomspace(1e-4, 3.0, 120)]) * 0.25
         states = list(march(system.heat, system.initial(0.0), times, scheme="adaptive", tolerance=1e-5))
         rows = particle_sides(system, 0)
-        flows = np.array([contact_flows(system, s.time, s.temperatures)[rows] for s in states])
-        arcs = [ContactArc(float(t), ALPHA) for t in system.sides.theta[rows]]
+        flows = np.array([system.flows(s.time, s.temperatures)[rows] for s in states])
+        arcs = [ContactArc(float(t), ALPHA) for t in position_angles(system.sides.arms[rows])]
         truth = heat_disk_by_flows(arcs, times, flows, fourier * 0.25, radius=0.5, decades=2)
         assert np.all(np.diff(truth.time.values) > 0.0)
         means = np.array([system.particle_temperatures(s.temperatures)[0] for s in states])
         np.testing.assert_allclose(truth.mean_temperature, np.interp(fourier * 0.25, times, means), atol=1e-3)
         nodes = system.sides.nodes[rows]
-        contacts = np.array([system.contact_temperatures(s.time, s.temperatures)[nodes] for s in states])
+        contacts = np.array([contact_temperatures(system, s.time, s.temperatures)[nodes] for s in states])
         at = np.stack([np.interp(fourier * 0.25, times, column) for column in contacts.T], axis=-1)
         errors[dipoles] = np.abs(truth.arc_temperature.values - at).max(axis=1)
     assert errors[False][2] < 0.02  # the flux still changes
@@ -63,33 +64,33 @@ def test_constant_flows_are_the_disk_under_constant_heat():
 
 
 def test_pipe_flows_feed_the_particles(row):
-    pipes = pipe_transient(row, WALLS, resistance="uniform", conductivity=2.0, contact_resistance=0.3)
-    sides = contact_sides(row)
+    pipes = transient_system(
+        medium_of(row.with_resistance(0.3), 2.0, heat_capacity=1.0), WALLS, engine="pipe", method="uniform"
+    )
+    sides = pipes.sides
     *_, state = march(pipes.heat, pipes.initial(0.0), [0.0, 0.2], steps=10)
     means = pipes.particle_temperatures(state.temperatures)
-    walls = pipes.wall_temperatures(state.time, state.temperatures)
-    given = {"resistance": "uniform", "conductivity": 2.0, "contact_resistance": 0.3}
-    flows = pipe_contact_flows(row, sides, means, walls, **given)
+    flows = pipes.flows(state.time, state.temperatures)
     into = np.bincount(sides.particles, flows, minlength=2)
-    np.testing.assert_allclose(into, pipes.heat.slope(state.time, state.temperatures)[:2], atol=1e-13)
-    between, _ = pipe_conductances(row, **given)
+    np.testing.assert_allclose(into, pipes.heat.slope(state.time, state.temperatures)[-2:], atol=1e-13)
+    between, _ = contact_conductances(pipes.medium, "standard")
     assert flows[sides.of_contacts[0, 1]] == pytest.approx(between[0] * (means[0] - means[1]))
 
 
 def test_pipe_flows_at_rest_are_those_of_the_steady_network(row):
-    system = pipe_transient(row, WALLS | {"right": FixedTemperature(0.0)})
+    system = transient_system(
+        medium_of(row, heat_capacity=1.0), WALLS | {"right": FixedTemperature(0.0)}, engine="pipe"
+    )
     *_, late = march(system.heat, system.initial(0.5), [0.0, 400.0], steps=100)
-    sides = contact_sides(row)
-    walls = system.wall_temperatures(late.time, late.temperatures)
-    flows = pipe_contact_flows(row, sides, system.particle_temperatures(late.temperatures), walls)
-    steady = pipe_conductivity(row, axes=(0,)).solutions[0]
-    np.testing.assert_allclose(np.abs(flows[np.abs(flows) > 1e-9]), abs(steady.contact_flows[0, 0]), rtol=1e-8)
-    np.testing.assert_allclose(np.bincount(sides.particles, flows), 0.0, atol=1e-12)
+    flows = system.flows(late.time, late.temperatures)
+    steady = pipe_conductivity(medium_of(row), axes=(0,)).solutions[0]
+    np.testing.assert_allclose(np.abs(flows[np.abs(flows) > 1e-9]), abs(steady.flows[0, 0]), rtol=1e-8)
+    np.testing.assert_allclose(np.bincount(system.sides.particles, flows), 0.0, atol=1e-12)
 
 
 def test_no_such_particle(row):
     with pytest.raises(InputError, match="no particle 2: they are numbered from 0 to 1"):
-        particle_sides(transient_system(row, WALLS), 2)
+        particle_sides(transient_system(medium_of(row, heat_capacity=1.0), WALLS), 2)
 
 
 @pytest.mark.parametrize(

@@ -8,18 +8,21 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import effective_conductivity
+from etc_engine.engines.dtem.conductivity import element_conductivity
 from etc_engine.engines.dtem.model_error import chord_error_estimate, chord_error_terms
 from etc_engine.errors import InputError
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.packing import PackingSpec, pack
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.packing.radii import parse_radii
+from etc_engine.realization import effective_conductivity
 
 
-def error_and_estimate(network, **options):
-    chord = effective_conductivity(network, axes=(0,), **options)
-    exact = effective_conductivity(network, method="exact", modes=4, axes=(0,), **options)
+def error_and_estimate(network, conductivity=1.0):
+    medium = medium_of(network, conductivity)
+    chord = element_conductivity(medium, axes=(0,))
+    exact = element_conductivity(medium, method="exact", modes=4, axes=(0,))
     return abs(chord.tensor[0, 0] / exact.tensor[0, 0] - 1.0), chord_error_estimate(chord.solutions[0])
 
 
@@ -49,7 +52,7 @@ def test_estimate_covers_overlapping_disks_of_mixed_conductivity():
 def test_terms_are_those_of_a_disk_worked_out_by_hand():
     """Square lattice: Q = +-q at 0 and 180 degrees, none above and below, where the slope is q/(pi kappa)."""
     packing = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
-    solution = effective_conductivity(bonded_contacts(packing, 0.2)).solutions[0]
+    solution = effective_conductivity(medium_of(bonded_contacts(packing, 0.2))).solutions[0]
     q, a = solution.heat_flows[:, 0].max(), np.sin(0.2)
     energy = solution.energies[0, 0]
     expected = [2 * (q / np.pi) ** 2 * a**3 * (1 + 7 * a**4) / energy, 0.0, 0.0]
@@ -59,7 +62,7 @@ def test_terms_are_those_of_a_disk_worked_out_by_hand():
 def test_estimate_does_not_see_units():
     packing = ParticlePacking([[0.1, 0.2], [0.6, 0.2 + 0.5 * 3**0.5]], [0.5, 0.5], Box((1.0, 3**0.5), (True, True)))
     values = [
-        chord_error_estimate(effective_conductivity(network, conductivity=kappa).solutions[0])
+        chord_error_estimate(effective_conductivity(medium_of(network, kappa)).solutions[0])
         for network, kappa in (
             (bonded_contacts(packing, 0.2), 1.0),
             (bonded_contacts(packing, 0.2), 40.0),
@@ -76,7 +79,7 @@ def test_estimate_does_not_see_units():
 
 
 def test_it_is_for_chord_alone(feng_particles):
-    solution = effective_conductivity(overlap_contacts(feng_particles), method="arc", axes=(0,)).solutions[0]
+    solution = effective_conductivity(medium_of(overlap_contacts(feng_particles)), method="arc", axes=(0,)).solutions[0]
     with pytest.raises(InputError, match="estimated for method chord, found a solution by arc"):
         chord_error_estimate(solution)
 

@@ -8,6 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from etc_engine.box import Box
 from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.medium.backbone import find_backbone
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import bonded_contacts
 from etc_engine.packing.particles import ParticlePacking
@@ -55,7 +56,7 @@ def test_backbone_has_no_dead_ends_and_prunes_nothing_else():
 def test_pruning_does_not_change_the_energy(periodic):
     """The same system with dead ends kept (an all-true backbone of the spanning clusters)."""
     network = site_percolation(30, 0.7, 112, periodic)
-    pruned = solve_steady(network, (0,))
+    pruned = solve_steady(medium_of(network), (0,))
     backbone = find_backbone(network, (0,))
     kept = np.unique(network.pairs[backbone.contacts])
     spanning = np.isin(backbone.clusters, np.unique(backbone.clusters[kept]))
@@ -65,7 +66,7 @@ def test_pruning_does_not_change_the_energy(periodic):
         backbone.clusters,
         backbone.spans,
     )
-    full = solve_steady(network, (0,), backbone=whole)
+    full = solve_steady(medium_of(network), (0,), backbone=whole)
     assert full.reports[0].unknowns > pruned.reports[0].unknowns
     assert pruned.energies[0, 0] == pytest.approx(full.energies[0, 0], rel=1e-10)
 

@@ -7,12 +7,13 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.engines.pipe.steady import pipe_conductivity
-from etc_engine.engines.pipe.transient import pipe_transient
 from etc_engine.errors import InputError
 from etc_engine.laws.disk import chord_resistance
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable
 from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import SCHEMES, critical_step, march
 from etc_engine.structure.union import union_area
 
@@ -51,7 +52,7 @@ def test_ring_of_disks_follows_the_cosine_exactly():
     centers = np.stack([np.arange(n) + 0.5, np.full(n, 1.0)], axis=1)
     network = bonded_contacts(ParticlePacking(centers, np.full(n, 0.5), Box((float(n), 2.0), (True, False))), ALPHA)
     C, c = of_chain(2)
-    system = pipe_transient(network, {}, conductivity=2.0, heat_capacity=3.0)
+    system = transient_system(medium_of(network, 2.0, heat_capacity=3.0), {}, engine="pipe")
     k = 2.0 * np.pi / n
     initial = system.initial(lambda centers: 5.0 + np.cos(k * centers[:, 0]))
     span = 4.0
@@ -66,7 +67,11 @@ def test_row_between_fixed_walls_follows_its_slowest_sine_exactly():
     """A wall contact is half a pipe pair: by mirror images the modes are sin(m pi x / L) at the centres."""
     n = 8
     C, c = of_chain(2)
-    system = pipe_transient(chain(n), {"left": FixedTemperature(0.0), "right": FixedTemperature(0.0)})
+    system = transient_system(
+        medium_of(chain(n), heat_capacity=1.0),
+        {"left": FixedTemperature(0.0), "right": FixedTemperature(0.0)},
+        engine="pipe",
+    )
     x = np.arange(n) + 0.5
     for m in (1, 3):
         shape = np.sin(m * np.pi * x / n)
@@ -77,7 +82,11 @@ def test_row_between_fixed_walls_follows_its_slowest_sine_exactly():
 
 def test_one_disk_under_a_convective_wall_is_a_lumped_body():
     """The film and the wall's pipe are in series: T = T_a (1 - exp(-t/tau))."""
-    system = pipe_transient(chain(1), {"left": Convective(0.7, 10.0)}, contact_resistance=0.4)
+    system = transient_system(
+        medium_of(chain(1).with_resistance(0.4), heat_capacity=1.0),
+        {"left": Convective(0.7, 10.0)},
+        engine="pipe",
+    )
     series = 1.0 / (0.7 * 2.0) + chord_resistance(ALPHA) + 0.4
     _, c = of_chain(2)  # the insulated right wall is bonded too
     tau = c * series
@@ -104,11 +113,17 @@ def test_heat_stored_is_the_heat_that_came_in(random_network, walls, scheme):
     n = random_network.packing.count
     source = np.zeros(n)
     source[: n // 2] = 0.3
-    system = pipe_transient(random_network, walls, source=lambda t: source * (1.0 + t), heat_capacity=2.0)
+    system = transient_system(
+        medium_of(random_network, heat_capacity=2.0),
+        walls,
+        engine="pipe",
+        source=lambda t: source * (1.0 + t),
+    )
     begin = system.initial(lambda centers: centers[:, 1])
     states = list(march(system.heat, begin, [0.0, 0.02, 0.05], scheme=scheme, **control(scheme, system.heat, 0.05)))
     last = states[-1]
-    stored = system.heat.capacity[:n] @ (system.particle_temperatures(last.temperatures) - begin[:n])
+    risen = system.particle_temperatures(last.temperatures) - system.particle_temperatures(begin)
+    stored = system.capacities @ risen
     assert last.heat.sum() == pytest.approx(stored, abs=1e-11 * np.abs(last.heat).sum())
     assert stored > 0.001
     assert last.heat[-1] == pytest.approx(source.sum() * (0.05 + 0.5 * 0.05**2), rel=2e-2)
@@ -118,9 +133,13 @@ def test_heat_stored_is_the_heat_that_came_in(random_network, walls, scheme):
 
 @pytest.mark.parametrize("scheme", ["backward-euler", "bdf2", "adaptive"])
 def test_late_times_are_the_steady_network(random_network, scheme):
-    steady = pipe_conductivity(random_network, axes=(0,), contact_resistance=0.1, tolerance=1e-14)
+    steady = pipe_conductivity(medium_of(random_network.with_resistance(0.1)), axes=(0,), tolerance=1e-14)
     walls = {"left": FixedTemperature(1.0), "right": FixedTemperature(0.0)}
-    system = pipe_transient(random_network, walls, contact_resistance=0.1)
+    system = transient_system(
+        medium_of(random_network.with_resistance(0.1), heat_capacity=1.0),
+        walls,
+        engine="pipe",
+    )
     times = [0.0, 20.0, 40.0]
     given = {"tolerance": 1e-6} if scheme == "adaptive" else {"steps": 60}
     _, before, last = march(system.heat, system.initial(0.5), times, scheme=scheme, **given)
@@ -136,7 +155,11 @@ def test_late_times_are_the_steady_network(random_network, scheme):
 
 def test_a_rattler_keeps_its_heat_to_the_last_bit():
     packing = ParticlePacking([[0.5, 0.5], [1.5, 0.5], [0.3, 1.5]], [0.5, 0.5, 0.1], Box((2.0, 2.0)))
-    system = pipe_transient(bonded_contacts(packing, 0.1), {"left": FixedTemperature(1.0)})
+    system = transient_system(
+        medium_of(bonded_contacts(packing, 0.1), heat_capacity=1.0),
+        {"left": FixedTemperature(1.0)},
+        engine="pipe",
+    )
     initial = system.initial([0.1, 0.2, 0.7])
     for scheme in SCHEMES:
         given = {"tolerance": 1e-3} if scheme == "adaptive" else {"step": 0.05}
@@ -149,7 +172,11 @@ def test_a_rattler_keeps_its_heat_to_the_last_bit():
 def test_maximum_principle(random_network, seed, scheme):
     rng = np.random.default_rng(seed)
     walls = {"left": FixedTemperature(rng.uniform()), "right": Convective(rng.uniform(0.1, 10.0), rng.uniform())}
-    system = pipe_transient(random_network, walls, heat_capacity=rng.uniform(0.5, 2.0, random_network.packing.count))
+    system = transient_system(
+        medium_of(random_network, heat_capacity=rng.uniform(0.5, 2.0, random_network.packing.count)),
+        walls,
+        engine="pipe",
+    )
     initial = system.initial(rng.uniform(size=random_network.packing.count))
     h = 0.5 * critical_step(system.heat) if scheme == "explicit-euler" else rng.uniform(1e-4, 1.0)
     bounds = [value for c in walls.values() for value in (c.temperature(0.0),)]
@@ -160,7 +187,11 @@ def test_maximum_principle(random_network, seed, scheme):
 
 
 def test_explicit_steps_beyond_the_critical_one_are_refused(random_network):
-    system = pipe_transient(random_network, {"left": Convective(3.0, 1.0)})
+    system = transient_system(
+        medium_of(random_network, heat_capacity=1.0),
+        {"left": Convective(3.0, 1.0)},
+        engine="pipe",
+    )
     critical = critical_step(system.heat)
     with pytest.raises(InputError, match=f"exceeds the critical one of {critical:.6g} s"):
         list(march(system.heat, system.initial(0.0), [0.0, 1.1 * critical], scheme="explicit-euler", steps=1))
@@ -168,14 +199,14 @@ def test_explicit_steps_beyond_the_critical_one_are_refused(random_network):
 
 def test_capacity_is_that_of_the_union_of_overlapping_disks(feng_particles):
     """Chords, walls included, cut every overlap exactly once."""
-    system = pipe_transient(overlap_contacts(feng_particles), {}, heat_capacity=2.0)
+    system = transient_system(medium_of(overlap_contacts(feng_particles), heat_capacity=2.0), {}, engine="pipe")
     assert system.heat.capacity.sum() == pytest.approx(2.0 * union_area(feng_particles), rel=1e-12)
 
 
 def test_time_scales_with_capacity_over_conductivity(random_network):
     walls = {"left": FixedTemperature(1.0)}
-    slow = pipe_transient(random_network, walls, conductivity=2.0, heat_capacity=6.0)
-    fast = pipe_transient(random_network, walls)
+    slow = transient_system(medium_of(random_network, 2.0, heat_capacity=6.0), walls, engine="pipe")
+    fast = transient_system(medium_of(random_network, heat_capacity=1.0), walls, engine="pipe")
     *_, a = march(slow.heat, slow.initial(0.0), [0.0, 0.3], steps=20)
     *_, b = march(fast.heat, fast.initial(0.0), [0.0, 0.1], steps=20)
     assert a.temperatures == pytest.approx(b.temperatures, abs=1e-12)
@@ -187,22 +218,23 @@ def test_time_scales_with_capacity_over_conductivity(random_network):
     [
         ({"walls": {"west": Insulated()}}, "unknown wall 'west': expected one of left, right, bottom, top"),
         ({"walls": {"top": HeatFlux(1.0)}}, "no particle touches the top wall"),
-        ({"heat_capacity": 0.0}, "the heat capacity must be positive, found 0"),
+        ({"heat_capacity": 0.0}, "the heat capacity must be positive and finite, found 0"),
         ({"source": np.ones(3)}, "the source must be one finite number or 4 of them"),
-        ({"resistance": "round"}, "unknown pipe resistance"),
+        ({"method": "round"}, "has no method 'round': expected one of chord, uniform"),
     ],
 )
 def test_what_is_refused(change, message):
-    arguments = {"walls": {}} | change
+    given = {"walls": {}, "heat_capacity": 1.0} | change
     with pytest.raises(InputError, match=message):
-        pipe_transient(chain(4), arguments.pop("walls"), **arguments)
+        medium = medium_of(chain(4), heat_capacity=given.pop("heat_capacity"))
+        transient_system(medium, given.pop("walls"), engine="pipe", **given)
 
 
 def test_initial_values_and_periodic_walls_that_are_refused(hexagonal):
     network = bonded_contacts(hexagonal(), 0.1)
     with pytest.raises(InputError, match="the box is periodic across the left wall"):
-        pipe_transient(network, {"left": HeatFlux(1.0)})
-    system = pipe_transient(network, {"left": Insulated()})
+        transient_system(medium_of(network, heat_capacity=1.0), {"left": HeatFlux(1.0)}, engine="pipe")
+    system = transient_system(medium_of(network, heat_capacity=1.0), {"left": Insulated()}, engine="pipe")
     with pytest.raises(InputError, match="initial temperature must be one finite number or 2 of them"):
         system.initial([1.0, 2.0, 3.0])
     with pytest.raises(InputError, match="initial temperature must be"):

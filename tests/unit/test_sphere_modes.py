@@ -7,17 +7,17 @@ import pytest
 from scipy.special import eval_jacobi
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.effective import effective_conductivity
-from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.exact.spheres import exact_sphere_elements
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.sphere import chord_resistance, disk_resistance, mutual_resistance
 from etc_engine.laws.sphere_modes import _dual_scale, _self_block, mode_tables, own_blocks, pair_means
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.realization import effective_conductivity
 
 
 def test_the_first_mode_is_the_equilibrium_disk():
@@ -52,8 +52,8 @@ def test_temperatures_and_fluxes_are_dual(family):
 def test_exact_of_degree_zero_is_chord_without_dents():
     chain = ParticlePacking([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]], [0.5] * 3, Box((3.0, 1.0, 1.0)))
     network = bonded_contacts(chain, 0.3)
-    one = effective_conductivity(network, method="exact", modes=1, axes=(0,)).tensor[0, 0]
-    assert one == pytest.approx(effective_conductivity(network, axes=(0,)).tensor[0, 0], rel=1e-9)
+    one = effective_conductivity(medium_of(network), method="exact", modes=1, axes=(0,)).tensor[0, 0]
+    assert one == pytest.approx(effective_conductivity(medium_of(network), axes=(0,)).tensor[0, 0], rel=1e-9)
 
 
 def clump(seed: int = 12) -> ParticlePacking:
@@ -77,7 +77,7 @@ def test_elements_turn_with_the_sphere():
     blocks = []
     for one in (packing, turned):
         sides = contact_sides(overlap_contacts(one))
-        elements = exact_sphere_elements(sides, Material(np.ones(one.count), np.zeros(sides.nodes.max() + 1)), 6)
+        elements = exact_sphere_elements(sides, np.ones(one.count), 6)
         n = 6 * (sides.offsets[1] - sides.offsets[0])
         block = elements.values[: n * n].reshape(n, n)
         blocks.append(block[::6, ::6])
@@ -93,7 +93,7 @@ def test_field_of_exact_recovers_its_contact_temperatures():
     centers = np.stack(np.meshgrid(*[np.arange(3.0)] * 3), axis=-1).reshape(-1, 3) + 0.5
     packing = ParticlePacking(centers, rng.uniform(0.5, 0.56, 27) * 1.04, Box((3.0, 3.0, 3.0)))
     network = overlap_contacts(packing)
-    solution = solve_steady(network, (2,), method="exact")
+    solution = solve_steady(medium_of(network), (2,), method="exact")
     assert solution.modes == 6
     field = recover_field(solution)
     at = solution.temperatures[solution.sides.of_contacts[:, 0], 0]
@@ -106,6 +106,6 @@ def test_what_exact_refuses():
     with pytest.raises(
         GeometryError, match="particle 0 is beyond method exact: the half-angle 82 degrees of a contact"
     ):
-        effective_conductivity(bonded_contacts(alone, np.radians(82.0)), method="exact", axes=(0,))
+        effective_conductivity(medium_of(bonded_contacts(alone, np.radians(82.0))), method="exact", axes=(0,))
     with pytest.raises(InputError, match="between 1 and 6, found 7"):
-        effective_conductivity(bonded_contacts(alone, 0.1), method="exact", modes=7)
+        effective_conductivity(medium_of(bonded_contacts(alone, 0.1)), method="exact", modes=7)

@@ -6,25 +6,26 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.storage import stored_areas
-from etc_engine.engines.dtem.transient import transient_system
-from etc_engine.engines.pipe.conductances import pipe_conductances
-from etc_engine.engines.pipe.transient import pipe_transient
 from etc_engine.errors import InputError
+from etc_engine.medium.conductances import contact_conductances
+from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.trajectory import Trajectory
+from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import SCHEMES, march
 from etc_engine.transient.moving import ThermalExpansion, march_trajectory
 
 
 def pipes(network, capacities, walls=None, **more):
-    return pipe_transient(network, walls or {}, heat_capacity=capacities / stored_areas(network, "chord"), **more)
+    return transient_system(
+        medium_of(network, more.pop("conductivity", 1.0)), walls or {}, engine="pipe", capacities=capacities, **more
+    )
 
 
 def elements(network, capacities, walls=None):
-    return transient_system(network, walls or {}, heat_capacity=capacities / stored_areas(network, "chord"))
+    return transient_system(medium_of(network), walls or {}, capacities=capacities)
 
 
 def wandering(frames=12, count=24, seed=53, walls=True):
@@ -90,7 +91,7 @@ def test_a_pair_exchanges_heat_only_while_it_touches():
     near, far = (ParticlePacking([[1.0, 0.5], [x, 0.5]], [radius, radius], box) for x in (1.58, 2.5))
     trajectory = Trajectory([0.0, 0.1, 0.3, 0.4], [near, far, near, near])
     states = list(march_trajectory(trajectory, overlap_contacts, pipes, [1.0, 0.0], steps=200))
-    (conductance,), _ = pipe_conductances(overlap_contacts(near))
+    (conductance,), _ = contact_conductances(medium_of(overlap_contacts(near)))
     rate = 2.0 * conductance / (np.pi * radius**2)
     for state, touched in zip(states, (0.0, 0.1, 0.1, 0.2), strict=True):
         difference = state.temperatures[0] - state.temperatures[1]

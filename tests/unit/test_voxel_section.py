@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.voxel import solve_cell
+from etc_engine.engines.voxel import Scheme, solve_cell
 from etc_engine.engines.voxel.section import sample, solve_section, temperature_between_walls
 from etc_engine.errors import InputError
-from etc_engine.medium.composite import Composite
+from etc_engine.medium.medium import Medium, Pores
 from etc_engine.output.figures.canvas import png
 from etc_engine.output.figures.voxel import draw_section
 from etc_engine.packing.particles import ParticlePacking
 
 
-def disk(inclusion: float, radius: float = 0.3, periodic: bool = True) -> Composite:
+def disk(inclusion: float, radius: float = 0.3, periodic: bool = True) -> Medium:
     box = Box((1.0, 1.0), (periodic,) * 2)
-    return Composite(ParticlePacking([[0.5, 0.5]], [radius], box), 1.0, np.array(inclusion))
+    return Medium(ParticlePacking([[0.5, 0.5]], [radius], box), np.array(inclusion), pores=Pores(1.0))
 
 
 def test_a_dilute_disk_has_the_uniform_flux_of_theory_inside():
@@ -31,7 +31,9 @@ def test_a_dilute_disk_has_the_uniform_flux_of_theory_inside():
 def test_temperatures_between_walls_of_layers_are_piecewise_linear():
     image = np.ones((8, 6))
     image[:, :3] = 3.0  # layers across y: gradients 0.5 and 1.5
-    solved = solve_cell(image, (2.0, 1.2), boundary="walls", axes=(1,), keep_gradients=True, tolerance=1e-12)
+    solved = solve_cell(
+        image, (2.0, 1.2), boundary="walls", axes=(1,), keep_gradients=True, scheme=Scheme(tolerance=1e-12)
+    )
     temperatures = temperature_between_walls(solved.gradients[0], 1, 1.2)
     exact = np.cumsum([0.05, 0.1, 0.1, 0.05 + 0.15, 0.3, 0.3])
     assert temperatures == pytest.approx(np.broadcast_to(exact, (8, 6)), abs=1e-9)
@@ -44,7 +46,7 @@ def test_temperatures_between_walls_are_antisymmetric_about_the_middle_of_a_symm
         boundary="walls",
         axes=(0,),
         keep_gradients=True,
-        tolerance=1e-12,
+        scheme=Scheme(tolerance=1e-12),
     )
     temperatures = temperature_between_walls(solved.gradients[0], 0, 1.0)
     assert temperatures + temperatures[::-1] == pytest.approx(np.ones((16, 16)), abs=1e-7)
@@ -72,7 +74,7 @@ def test_the_picture_shows_inclusions_and_flux():
 def test_spheres_are_cut_where_they_fill_the_largest_area():
     box = Box((1.0, 1.0, 2.0), (True,) * 3)
     pair = ParticlePacking([[0.5, 0.5, 0.42], [0.5, 0.5, 1.4]], [0.35, 0.2], box)
-    section = solve_section(Composite(pair, 1.0, np.array(4.0)), resolution=16)
+    section = solve_section(Medium(pair, np.array(4.0), pores=Pores(1.0)), resolution=16)
     assert section.height == pytest.approx(0.42, abs=0.5 / 16)
     assert section.fractions.mean() == pytest.approx(np.pi * 0.35**2, abs=0.01)
     assert draw_section(section, "k").get_suptitle() == f"section at z = {section.height:.4g} m, k"
@@ -80,7 +82,7 @@ def test_spheres_are_cut_where_they_fill_the_largest_area():
 
 def test_spheres_are_cut_in_the_middle():
     box = Box((1.0, 1.0, 1.0), (True,) * 3)
-    sphere = Composite(ParticlePacking([[0.5, 0.5, 0.5]], [0.35], box), 1.0, np.array(4.0))
+    sphere = Medium(ParticlePacking([[0.5, 0.5, 0.5]], [0.35], box), np.array(4.0), pores=Pores(1.0))
     section = solve_section(sphere, resolution=16)
     assert section.fractions.mean() == pytest.approx(np.pi * 0.35**2, abs=0.01)
 

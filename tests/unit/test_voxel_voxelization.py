@@ -13,14 +13,15 @@ from etc_engine.engines.voxel import voxelize
 from etc_engine.engines.voxel.fractions import ball_in_box
 from etc_engine.engines.voxel.voxelization import check_resolution
 from etc_engine.errors import InputError
-from etc_engine.medium.composite import Composite
+from etc_engine.medium.medium import Medium, Pores
+from etc_engine.medium.phases import conductivity_at, count_overlaps, find_owners
 from etc_engine.packing.particles import ParticlePacking
 
 coordinates = st.floats(-1.2, 1.2)
 
 
-def composite(centers, radii, box, inclusion=5.0) -> Composite:
-    return Composite(ParticlePacking(centers, radii, box), 1.0, inclusion)
+def composite(centers, radii, box, inclusion=5.0) -> Medium:
+    return Medium(ParticlePacking(centers, radii, box), inclusion, pores=Pores(1.0))
 
 
 @given(st.lists(coordinates, min_size=3, max_size=3), st.lists(st.floats(0.01, 2.0), min_size=3, max_size=3))
@@ -56,9 +57,9 @@ def test_the_voxels_hold_the_exact_volume_of_overlapping_inclusions(d, periodic)
     rng = np.random.default_rng(21)
     box = Box((1.0, 1.3, 0.9)[:d], (periodic,) * d)
     made = composite(rng.random((15, d)) * box.lengths, rng.uniform(0.1, 0.2, 15), box)
-    assert made.overlapping > 5
+    assert count_overlaps(made.packing) > 5
     image = voxelize(made, 20)
-    assert image.volume_fraction == pytest.approx(made.volume_fraction, abs=1e-9)
+    assert image.volume_fraction == pytest.approx(made.solid_fraction, abs=1e-9)
     assert image.fractions.max() <= 1.0 + 1e-12
     assert image.conductivity.mean() == pytest.approx(image.conductivity.mean().T)
 
@@ -71,8 +72,8 @@ def test_binary_voxels_have_the_phase_of_their_centre(d):
     )
     image = voxelize(made, 16, "binary")
     points = (np.indices((16,) * d).reshape(d, -1).T + 0.5) / 16
-    assert np.array_equal(image.conductivity.scalars.ravel(), made.conductivity_at(points))
-    assert image.volume_fraction == (made.phase(points) >= 0).mean()
+    assert np.array_equal(image.conductivity.scalars.ravel(), conductivity_at(made, points))
+    assert image.volume_fraction == (find_owners(made.packing, points) >= 0).mean()
 
 
 def test_a_shift_by_whole_voxels_shifts_the_image():

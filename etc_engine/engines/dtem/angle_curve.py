@@ -11,43 +11,19 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 
 from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.element import Elements, Material, smallest_ratio
-from etc_engine.engines.dtem.methods import Method, find_method, flux_modes
-from etc_engine.engines.dtem.steady import driven_walls, make_material, prescribe
+from etc_engine.engines.dtem.element import Elements, smallest_ratio
+from etc_engine.engines.dtem.steady import ElementGeometry, element_geometry
 from etc_engine.errors import GeometryError
-from etc_engine.medium.backbone import Backbone, find_backbone, restore_dead_ends
-from etc_engine.medium.network import ContactNetwork
-from etc_engine.medium.sides import ContactSides, check_arcs, contact_sides
+from etc_engine.medium.backbone import Backbone
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.sides import check_arcs
 from etc_engine.solvers import FamilySolution, Member, TrialSpace, solve_family
 
 TOLERANCE = 1e-8
 """Largest estimated relative error of a conductivity of a reduced solution."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Load:
-    """What the half-angles of one load group share."""
-
-    variant: Method
-    modes: int
-    material: Material
-    sides: ContactSides
-    every_side: ContactSides | None
-    lift: NDArray[np.float64]
-    prescribed: NDArray[np.bool_]
-
-    def elements(self, half_angle: float) -> Elements:
-        """Element matrices at a half-angle; GeometryError where the arcs do not fit."""
-        sides = replace(self.sides, alpha=np.full_like(self.sides.alpha, half_angle))
-        if self.every_side is None:
-            check_arcs(sides)
-        else:  # what carries no heat must still be a valid geometry
-            check_arcs(replace(self.every_side, alpha=np.full_like(self.every_side.alpha, half_angle)))
-        return self.variant.elements(sides, self.material, self.modes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +34,11 @@ class _Member(Member):
 
 
 def solve_angle_curve(
-    network: ContactNetwork,
+    medium: Medium,
     axes: tuple[int, ...],
     half_angles: Sequence[float],
     *,
     method: str = "chord",
-    conductivity: ArrayLike = 1.0,
-    contact_resistance: ArrayLike = 0.0,
     tolerance: float = 1e-10,
     backbone: Backbone | None = None,
 ) -> Iterator[tuple[int, FamilySolution | None]]:
@@ -72,13 +46,13 @@ def solve_angle_curve(
 
     Parameters
     ----------
-    network : ContactNetwork
-        Its own angles do not count.
+    medium : Medium
+        With a contact network whose own angles do not count.
     axes : tuple of int
         A single walled axis, or periodic axes only.
     half_angles : sequence of float [rad]
         Each for all contacts.
-    method, conductivity, contact_resistance, backbone
+    method, backbone
         As in `etc_engine.engines.dtem.steady.solve_steady`.
     tolerance : float
         Relative error of the conductivity left by full solutions; reduced ones have an estimated
@@ -103,11 +77,11 @@ def solve_angle_curve(
     >>> from etc_engine.medium.rules import bonded_contacts
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
-    >>> curve = solve_angle_curve(bonded_contacts(packing, 0.1), (0,), [0.05, 0.1, 0.2])
+    >>> curve = solve_angle_curve(Medium(packing, 1.0, bonded_contacts(packing, 0.1)), (0,), [0.05, 0.1, 0.2])
     >>> {i: (solution.energies.item().__round__(6), solution.snapshots) for i, solution in sorted(curve)}
     {0: (0.179899, 1), 1: (0.214842, 0), 2: (0.268365, 1)}
     """
-    load = _prepare(network, axes, method, make_material(network, conductivity, contact_resistance), backbone)
+    load = element_geometry(medium, axes, method, None, backbone)
     modes = load.modes
     free = np.where(load.prescribed, -1, np.cumsum(~load.prescribed) - 1)
     size = int((~load.prescribed).sum())
@@ -125,26 +99,23 @@ def solve_angle_curve(
     )
 
 
-def _prepare(
-    network: ContactNetwork, axes: tuple[int, ...], method: str, material: Material, backbone: Backbone | None
-) -> _Load:
-    dimension = network.packing.dimension
-    variant, modes = find_method(method, dimension), flux_modes(method, None, dimension)
-    backbone = backbone or find_backbone(network, axes)
-    if variant.exact_cuts:
-        backbone = restore_dead_ends(network, backbone)
-    kept = np.concatenate([backbone.contacts, backbone.wall_contacts])
-    reduced = network.select(backbone.contacts, backbone.wall_contacts)
-    sides = contact_sides(reduced)
-    every_side = None
-    if not kept.all():
-        every_side = contact_sides(network.select(np.ones_like(backbone.contacts), driven_walls(network, axes)))
-    material = replace(material, contact_resistance=material.contact_resistance[kept])
-    lift, prescribed = prescribe(reduced, axes, backbone, sides, modes)
-    return _Load(variant, modes, material, sides, every_side, lift, prescribed)
+def elements_at(load: ElementGeometry, half_angle: float) -> Elements:
+    """Element matrices at a half-angle.
+
+    Raises
+    ------
+    GeometryError
+        Where the arcs do not fit.
+    """
+    sides = replace(load.sides, alpha=np.full_like(load.sides.alpha, half_angle))
+    if load.every_side is None:
+        check_arcs(sides)
+    else:  # what carries no heat must still be a valid geometry
+        check_arcs(replace(load.every_side, alpha=np.full_like(load.every_side.alpha, half_angle)))
+    return load.variant.elements(sides, load.conductivity, load.modes)
 
 
-def _without_unknowns(load: _Load, half_angle: float) -> FamilySolution | None:
+def _without_unknowns(load: ElementGeometry, half_angle: float) -> FamilySolution | None:
     """Every node is a wall or pinned, or nothing spans: the lift is the solution."""
     start = time.perf_counter()
     member = _member(load, half_angle)
@@ -154,15 +125,15 @@ def _without_unknowns(load: _Load, half_angle: float) -> FamilySolution | None:
     return FamilySolution(np.empty((0, len(energies))), energies, 0.0, True, 0, 0, time.perf_counter() - start)
 
 
-def _member(load: _Load, half_angle: float) -> Member | None:
+def _member(load: ElementGeometry, half_angle: float) -> Member | None:
     try:
-        elements = load.elements(half_angle)
+        elements = elements_at(load, half_angle)
     except GeometryError:
         return None
     return _Member(elements.apply, partial(_matrix, load, elements), partial(_floor, elements), elements=elements)
 
 
-def _matrix(load: _Load, elements: Elements) -> csr_matrix:
+def _matrix(load: ElementGeometry, elements: Elements) -> csr_matrix:
     return assemble(elements, load.lift, load.prescribed).matrix
 
 

@@ -12,37 +12,51 @@ needs one small Cholesky factor, and cannot see a constant added to H.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.errors import GeometryError
+from etc_engine.laws.disk import position_angles
 from etc_engine.medium.sides import ContactSides
 
 
-@dataclass(frozen=True, eq=False)
-class Material:
-    """What the particles and their contacts are made of.
+class DiskContacts(NamedTuple):
+    """The contacts of disks as compiled code takes them, sorted by particle.
 
     Parameters
     ----------
+    offsets : ndarray of int, shape (n + 1,)
+        Contacts of disk p: ``offsets[p]`` to ``offsets[p + 1]``.
+    theta, alpha : ndarray, shape (s,) [rad]
+        Position angle and half-angle of each contact.
+    signs : ndarray, shape (s,)
+        -1 where odd modes change sign.
+    resistances : ndarray, shape (s,) [m K/W]
+        Share of the contact resistance.
     conductivity : ndarray, shape (n,) [W/(m K)]
-        Of each particle.
-    contact_resistance : ndarray, shape (contacts,) [m K/W]
-        Total resistance of each contact per unit thickness, particle contacts first, wall contacts after them.
     """
 
+    offsets: NDArray[np.int64]
+    theta: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    signs: NDArray[np.float64]
+    resistances: NDArray[np.float64]
     conductivity: NDArray[np.float64]
-    contact_resistance: NDArray[np.float64]
 
-    def side_resistances(self, sides: ContactSides) -> NDArray[np.float64]:
-        """Part of the contact resistance that belongs to each side, shape (s,).
 
-        Half of it at either side of a particle contact, all of it at the one side of a wall contact.
-        """
-        number = np.bincount(sides.nodes, minlength=self.contact_resistance.size)
-        return (self.contact_resistance / np.maximum(number, 1))[sides.nodes]
+def disk_contacts(sides: ContactSides, conductivity: NDArray[np.float64]) -> DiskContacts:
+    """Contact sides of disks with their position angles."""
+    return DiskContacts(
+        sides.offsets,
+        position_angles(sides.arms),
+        sides.alpha,
+        sides.mode_signs,
+        sides.resistances,
+        np.ascontiguousarray(conductivity),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +91,7 @@ class Elements:
         return _apply(self.offsets, self.starts, self.values, np.ascontiguousarray(temperatures))
 
 
-@dataclass(frozen=True, eq=False)
-class Resistances:
+class Resistances(NamedTuple):
     """Resistance matrices H of all disks, packed as `Elements` are, and how their rows see a field of one dipole.
 
     Parameters
@@ -103,6 +116,43 @@ class Resistances:
 def packed_starts(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
     """Where each square matrix begins in a packed array, for elements of ``offsets[p + 1] - offsets[p]`` rows."""
     return np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
+
+
+def condensed_elements(resistances: Resistances, sides: ContactSides) -> Elements:
+    """Conductivity matrices K_e = P (P^T H P)^{-1} P^T of all disks from their resistances.
+
+    Raises
+    ------
+    GeometryError
+        If the contacts of a disk are so wide or close that P^T H P is not positive definite.
+    """
+    modes = resistances.modes
+    offsets = modes * sides.offsets
+    values = np.zeros_like(resistances.values)
+    bad = _condense_all(offsets, resistances.starts, resistances.values, modes, values)
+    refuse_indefinite(bad, sides)
+    nodes = (modes * sides.nodes[:, None] + np.arange(modes)).ravel()
+    return Elements(modes, offsets, nodes, resistances.starts, values)
+
+
+def contact_potentials(
+    resistances: Resistances, sides: ContactSides, flows: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Temperature of every contact above its particle's mean, sum_j h_ij Q_j, shape (s,).
+
+    Parameters
+    ----------
+    resistances : Resistances
+    sides : ContactSides
+        All sides, those without flux included.
+    flows : ndarray, shape (s, modes) [W/m]
+        Flux modes into the particle at each side.
+    """
+    modes = resistances.modes
+    temperatures = _apply(
+        modes * sides.offsets, resistances.starts, resistances.values, np.ascontiguousarray(flows).reshape(-1, 1)
+    )
+    return np.ascontiguousarray(temperatures[::modes, 0])
 
 
 def refuse_indefinite(particle: int, sides: ContactSides) -> None:
@@ -181,13 +231,32 @@ def _largest_ratio(
 
 
 @njit(cache=True)
+def _condense_all(
+    offsets: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    resistances: NDArray[np.float64],
+    modes: int,
+    values: NDArray[np.float64],
+) -> int:
+    """Condense every disk of at least two contacts; returns the first that has no inverse, or -1."""
+    for p in range(offsets.size - 1):
+        size = offsets[p + 1] - offsets[p]
+        if size < 2 * modes:
+            continue
+        h = resistances[starts[p] : starts[p + 1]].reshape((size, size))
+        if not condense(h, size, modes, np.empty((size, size)), values[starts[p] : starts[p + 1]]):
+            return p
+    return -1
+
+
+@njit(cache=True)
 def condense(
     h: NDArray[np.float64], size: int, modes: int, work: NDArray[np.float64], out: NDArray[np.float64]
 ) -> bool:
     """K_e = P (P^T H P)^{-1} P^T of one element, row by row into ``out``.
 
     ``h[:size, :size]`` is H; rows ``0, modes, 2 modes, ...`` carry the heat flows that sum to zero, the first row
-    of the last contact is the one left out of the basis. ``work`` has the shape of ``h``. Answers False if
+    of the last contact is the one left out of the basis. ``work`` has the shape of ``h``. Returns False if
     P^T H P is not positive definite.
     """
     last = size - modes

@@ -20,9 +20,10 @@ from etc_engine.engines.dtem.facet_elements import (
 )
 from etc_engine.errors import InputError
 from etc_engine.medium.backbone import Backbone
-from etc_engine.medium.conductivity import EffectiveConductivity, assemble_tensor
+from etc_engine.medium.conductivity import EffectiveConductivity, effective_tensor
 from etc_engine.medium.facets import FacetLinks
-from etc_engine.solvers import SolveReport, solve_energy
+from etc_engine.medium.loads import driven_walls, wall_temperatures
+from etc_engine.solvers import SolveReport, solve_loads
 from etc_engine.solvers.star import star_preconditioner
 
 FEW_FACETS = 9
@@ -67,7 +68,7 @@ class FacetSolution:
     @property
     def backbone(self) -> Backbone:
         """Everything takes part: pores that conduct leave no dead ends."""
-        driven = driven_facets(self.links, self.axes)
+        driven = driven_walls(self.links, self.axes)
         clusters = np.zeros(self.links.packing.count, dtype=np.int64)
         return Backbone(np.ones(self.links.count, dtype=np.bool_), driven, clusters, (True,) * len(self.axes))
 
@@ -130,11 +131,6 @@ def uniform_material(
     return FacetMaterial(*arrays)
 
 
-def driven_facets(links: FacetLinks, axes: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Wall facets whose wall has a prescribed temperature, shape (w,)."""
-    return np.asarray((links.walls // 2 == axes[0]) & (not links.packing.box.periodic[axes[0]]))
-
-
 def solve_facets(
     links: FacetLinks, material: FacetMaterial, axes: tuple[int, ...], *, tolerance: float = 1e-10
 ) -> FacetSolution:
@@ -164,7 +160,7 @@ def solve_facets(
     -----
     Conjugate gradients, preconditioned by the elements as stars (`etc_engine.solvers.star`): 2 to 20 iterations.
     """
-    sides = facet_sides(links, driven_facets(links, axes), bool((material.open_fluid > 0.0).all()))
+    sides = facet_sides(links, driven_walls(links, axes), bool((material.open_fluid > 0.0).all()))
     starts, resistances = facet_resistances(links, material, sides)
     elements = facet_elements(sides, starts, resistances)
     system = assemble(elements, *_prescribe(links, sides, axes))
@@ -187,7 +183,7 @@ def _prescribe(
     wall = sides.links >= links.count
     prescribed[wall] = True
     hot = np.zeros(sides.links.size)
-    hot[wall] = 1.0 - links.walls[sides.links[wall] - links.count] % 2
+    hot[wall] = wall_temperatures(links.walls[sides.links[wall] - links.count])
     return hot[sides.nodes, None], prescribed
 
 
@@ -197,26 +193,15 @@ def _solve(
     """Free temperatures of all loads."""
     size = system.matrix.shape[0]
     if size == 0:
-        return np.zeros(system.rhs.shape), tuple(
-            SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0) for _ in system.lift_energies
-        )
+        return solve_loads(system.matrix, system.rhs, system.lift_energies)
     widths = np.diff(elements.offsets)
     owner = np.repeat(np.arange(widths.size), widths)
     local = np.arange(owner.size) - elements.offsets[owner]
     diagonal = resistances[elements.starts[owner] + local * (widths[owner] + 1)]
     preconditioner = star_preconditioner(system.free[elements.nodes], owner, 1.0 / diagonal, size)
-    u = np.empty(system.rhs.shape)
-    reports = []
-    for load, lift_energy in enumerate(system.lift_energies):
-        u[:, load], report = solve_energy(
-            system.matrix,
-            np.ascontiguousarray(system.rhs[:, load]),
-            float(lift_energy),
-            preconditioner=preconditioner,
-            tolerance=tolerance,
-        )
-        reports.append(report)
-    return u, tuple(reports)
+    return solve_loads(
+        system.matrix, system.rhs, system.lift_energies, preconditioner=preconditioner, tolerance=tolerance
+    )
 
 
 def facet_conductivity(
@@ -263,11 +248,8 @@ def facet_conductivity(
     >>> facet_conductivity(links, uniform_material(links, 100.0, 1.0)).tensor.round(2).diagonal()
     array([16.55, 16.55, 16.55])
     """
-    return assemble_tensor(
-        links.packing.box,
-        axes,
-        lambda group: solve_facets(links, material, group, tolerance=tolerance),
-        FacetSolution.wall_heat,
+    return effective_tensor(
+        links.packing.box, axes, lambda group: solve_facets(links, material, group, tolerance=tolerance)
     )
 
 

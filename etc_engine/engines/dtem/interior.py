@@ -20,10 +20,10 @@ from numba import njit
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
+from etc_engine.engines.dtem.element import DiskContacts, disk_contacts
 from etc_engine.engines.dtem.exact.field import exact_temperatures
-from etc_engine.engines.dtem.field import ParticleField
 from etc_engine.engines.dtem.methods import find_method
-from etc_engine.engines.dtem.steady import SteadySolution
+from etc_engine.medium.field import ParticleField
 
 _POINTS = 12
 _LEGENDRE = leggauss(_POINTS)[0], 0.5 * leggauss(_POINTS)[1]
@@ -31,15 +31,16 @@ _CHEBYSHEV = np.cos((np.arange(_POINTS) + 0.5) * np.pi / _POINTS), np.full(_POIN
 
 
 def temperatures_inside(
-    solution: SteadySolution, field: ParticleField, particles: NDArray[np.int64], points: NDArray[np.float64]
+    field: ParticleField, method: str, particles: NDArray[np.int64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Temperature at points inside particles.
 
     Parameters
     ----------
-    solution : SteadySolution
     field : ParticleField
-        Recovered from it.
+        Of a steady solution.
+    method : str
+        That solved it.
     particles : ndarray of int, shape (q,)
         The particle each point belongs to.
     points : ndarray, shape (q, 2) [m]
@@ -61,20 +62,15 @@ def temperatures_inside(
     Feng, Han, Li, Owen 2008, Eq. 37, doi:10.1016/j.jcp.2008.01.031.
     """
     sides = field.sides
-    if solution.method == "exact":
-        inside = points / solution.network.packing.radii[particles, None]
-        above = exact_temperatures(sides, solution.material, field.flow_modes, particles, inside)
+    kappa, scaled = field.medium.conductivity, points / field.medium.packing.radii[particles, None]
+    if method == "exact":
+        above = exact_temperatures(sides, kappa, field.flow_modes, particles, scaled)
         return field.particle_temperatures[particles] + above
-    uniform = find_method(solution.method).uniform_flux
+    uniform = find_method(method).uniform_flux
     values = _evaluate(
+        disk_contacts(sides, kappa),
         np.ascontiguousarray(particles, dtype=np.int64),
-        np.ascontiguousarray(points, dtype=np.float64),
-        solution.network.packing.radii,
-        solution.material.conductivity,
-        sides.offsets,
-        sides.theta,
-        sides.alpha,
-        sides.mode_signs,
+        np.ascontiguousarray(scaled),
         field.flow_modes,
         uniform,
         *(_LEGENDRE if uniform else _CHEBYSHEV),
@@ -84,28 +80,24 @@ def temperatures_inside(
 
 @njit(cache=True)
 def _evaluate(
+    disks: DiskContacts,
     particles: NDArray[np.int64],
     points: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-    offsets: NDArray[np.int64],
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    signs: NDArray[np.float64],
     flows: NDArray[np.float64],
     uniform: bool,
     nodes: NDArray[np.float64],
     weights: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Temperature above the particle's mean at every point."""
+    """Temperature above the particle's mean at every point, given in radii: the sum of the module's equation."""
+    theta, alpha, signs = disks.theta, disks.alpha, disks.signs
     values = np.zeros(particles.size)
     for q in range(particles.size):
         p = particles[q]
-        radius = min(math.hypot(points[q, 0], points[q, 1]) / radii[p], 1.0)
+        radius = min(math.hypot(points[q, 0], points[q, 1]), 1.0)
         angle = math.atan2(points[q, 1], points[q, 0])
         if radius < 1e-12:
             continue  # the centre of a disk without net flux has its mean temperature
-        for side in range(offsets[p], offsets[p + 1]):
+        for side in range(disks.offsets[p], disks.offsets[p + 1]):
             if flows[side, 0] == 0.0:
                 continue
             turn = angle - theta[side]
@@ -127,7 +119,7 @@ def _evaluate(
                     total -= sign * flows[side, k] * power.real / k
                     power /= joukowski
                     total += sign * flows[side, k] * _smooth_mode(k, alpha[side], sigma, nodes, weights)
-            values[q] -= total / (math.pi * conductivity[p])
+            values[q] -= total / (math.pi * disks.conductivity[p])
     return values
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.engines.dtem.element import DiskContacts, disk_contacts
 from etc_engine.engines.dtem.steady import SteadySolution
 from etc_engine.errors import InputError
 from etc_engine.medium.sides import ContactSides
@@ -46,10 +47,10 @@ def chord_error_terms(solution: SteadySolution, load: int = 0) -> NDArray[np.flo
     sides, energy = solution.sides, float(solution.energies[load, load])
     if energy == 0.0:
         return np.zeros(3)
-    kappa = solution.material.conductivity
+    kappa = solution.medium.conductivity
     slopes = np.zeros(sides.nodes.size)
     flows = np.ascontiguousarray(solution.heat_flows[:, load])
-    terms = np.array(_terms(sides.offsets, sides.theta, sides.alpha, flows, kappa, slopes))
+    terms = np.array(_terms(disk_contacts(sides, kappa), flows, slopes))
     return np.append(terms, _slope_term(sides, kappa, slopes)) / energy
 
 
@@ -91,11 +92,13 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     Examples
     --------
     >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.medium import Medium
     >>> from etc_engine.medium.rules import bonded_contacts
     >>> from etc_engine.engines.dtem.steady import solve_steady
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0), (True, True)))
-    >>> round(chord_error_estimate(solve_steady(bonded_contacts(disk, 0.35), (0, 1))), 3)
+    >>> solution = solve_steady(Medium(disk, 1.0, bonded_contacts(disk, 0.35)), (0, 1))
+    >>> round(chord_error_estimate(solution), 3)
     0.005
     """
     if solution.method != "chord":
@@ -107,26 +110,20 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
 
 
 @njit(cache=True)
-def _terms(
-    offsets: NDArray[np.int64],
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-    slopes: NDArray[np.float64],
-) -> tuple[float, float]:
+def _terms(disks: DiskContacts, flows: NDArray[np.float64], slopes: NDArray[np.float64]) -> tuple[float, float]:
     """S and M; the slopes G a of all sides into ``slopes``."""
     segments, moments = 0.0, 0.0
-    for p in range(offsets.size - 1):
-        for i in range(offsets[p], offsets[p + 1]):
+    theta, alpha, kappa = disks.theta, disks.alpha, disks.conductivity
+    for p in range(disks.offsets.size - 1):
+        for i in range(disks.offsets[p], disks.offsets[p + 1]):
             slope = 0.0
-            for j in range(offsets[p], offsets[p + 1]):
+            for j in range(disks.offsets[p], disks.offsets[p + 1]):
                 if i != j:
                     cot = 1.0 / np.tan(0.5 * (theta[i] - theta[j]))
                     squares = np.sin(alpha[i]) ** 2 + np.sin(alpha[j]) ** 2
                     slope += 0.5 * flows[j] * cot
-                    moments -= flows[i] * flows[j] * squares * cot * cot / (4.0 * np.pi * conductivity[p])
-            slopes[i] = slope * np.sin(alpha[i]) / (np.pi * conductivity[p])
+                    moments -= flows[i] * flows[j] * squares * cot * cot / (4.0 * np.pi * kappa[p])
+            slopes[i] = slope * np.sin(alpha[i]) / (np.pi * kappa[p])
             a = np.sin(alpha[i])
-            segments += conductivity[p] * slopes[i] ** 2 * a * (1.0 + 7.0 * a**4)
+            segments += kappa[p] * slopes[i] ** 2 * a * (1.0 + 7.0 * a**4)
     return segments, moments

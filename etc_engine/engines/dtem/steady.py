@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.assembly import LinearSystem, assemble, count_positive_off_diagonals
-from etc_engine.engines.dtem.element import Material
-from etc_engine.engines.dtem.methods import find_method, flux_modes
-from etc_engine.errors import InputError
+from etc_engine.engines.dtem.assembly import assemble, count_positive_off_diagonals
+from etc_engine.engines.dtem.methods import Variant, find_method, flux_modes
 from etc_engine.medium.backbone import Backbone, find_backbone, restore_dead_ends
+from etc_engine.medium.loads import contact_lift, driven_walls
+from etc_engine.medium.medium import Medium, check_conductors
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import NO_CUTS, ContactSides, check_arcs, contact_sides, insulated_cuts
-from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
-
-LARGEST = 1e100
-"""Of a conductivity or resistance: products of a few of them stay finite."""
+from etc_engine.solvers import SolveReport, solve_loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +23,8 @@ class SteadySolution:
 
     Parameters
     ----------
-    network : ContactNetwork
-        The whole network that was asked about.
+    medium : Medium
+        With its whole contact network.
     axes : tuple of int
         Load axes, one column k each: walls at temperature 1 (low end) and 0 (far end), or a mean
         temperature gradient of 1 along a periodic axis.
@@ -37,8 +34,6 @@ class SteadySolution:
         The contact sides of the backbone.
     method : str
         Name of the method.
-    material : Material
-        Of the whole network.
     temperatures : ndarray, shape (s, k) [K]
         Node temperature at each side; along a periodic axis measured from the mean gradient at the
         particle's centre.
@@ -47,22 +42,26 @@ class SteadySolution:
     energies : ndarray, shape (k, k)
         sum_p t_pa . K_p t_pb.
     reports : tuple of SolveReport
-        One a load.
+        One per load.
     positive_off_diagonals : int
         Entries of the matrix that break the M-matrix property.
     """
 
-    network: ContactNetwork
+    medium: Medium
     axes: tuple[int, ...]
     backbone: Backbone
     sides: ContactSides
     method: str
-    material: Material
     temperatures: NDArray[np.float64]
     flows: NDArray[np.float64]
     energies: NDArray[np.float64]
     reports: tuple[SolveReport, ...]
     positive_off_diagonals: int
+
+    @property
+    def network(self) -> ContactNetwork:
+        """The whole contact network."""
+        return self.medium.links
 
     @property
     def modes(self) -> int:
@@ -74,14 +73,70 @@ class SteadySolution:
         """Heat flow into the particle at each side, shape (s, k) [W/m]."""
         return self.flows[:, 0, :]
 
+    def wall_heat(self) -> tuple[float, float]:
+        """Heat flow into the particles at the low wall and out of them at the far wall [W/m]."""
+        at_wall = self.sides.nodes >= int(self.backbone.contacts.sum())
+        hot = at_wall & (self.temperatures[:, 0] == 1.0)
+        cold = at_wall & ~hot
+        return float(self.heat_flows[hot, 0].sum()), -float(self.heat_flows[cold, 0].sum())
+
+
+@dataclass(frozen=True, eq=False)
+class ElementGeometry:
+    """What the elements of one load group stand on, at any half-angle.
+
+    Parameters
+    ----------
+    variant : Variant
+    modes : int
+    conductivity : ndarray, shape (n,) [W/(m K)]
+    backbone : Backbone
+        Of what takes part: with its dead ends where the variant needs them.
+    sides : ContactSides
+        Of the contacts that take part.
+    every_side : ContactSides, optional
+        Of all contacts, driven walls included, where some take no part: they must still be a valid geometry.
+    lift : ndarray, shape (rows, k)
+    prescribed : ndarray of bool, shape (nodes,)
+        As of `etc_engine.medium.loads.contact_lift`.
+    """
+
+    variant: Variant
+    modes: int
+    conductivity: NDArray[np.float64]
+    backbone: Backbone
+    sides: ContactSides
+    every_side: ContactSides | None
+    lift: NDArray[np.float64]
+    prescribed: NDArray[np.bool_]
+
+
+def element_geometry(
+    medium: Medium, axes: tuple[int, ...], method: str, modes: int | None, backbone: Backbone | None
+) -> ElementGeometry:
+    """Backbone, contact sides and loads of one load group; arguments as in `solve_steady`."""
+    network = medium.links
+    check_conductors(medium)
+    variant, modes = find_method(method, medium.dimension), flux_modes(method, modes, medium.dimension)
+    backbone = find_backbone(network, axes) if backbone is None else backbone
+    driven, cuts = driven_walls(network, axes), NO_CUTS
+    if variant.exact_cuts:
+        backbone = restore_dead_ends(network, backbone)
+        cuts = insulated_cuts(network, driven)
+    reduced = network.select(backbone.contacts, backbone.wall_contacts)
+    sides = contact_sides(reduced, cuts)
+    every_side = None
+    if not (backbone.contacts.all() and backbone.wall_contacts.all()):
+        every_side = contact_sides(network.select(np.ones_like(backbone.contacts), driven))
+    lift, prescribed = contact_lift(reduced, axes, backbone.clusters, sides, modes)
+    return ElementGeometry(variant, modes, medium.conductivity, backbone, sides, every_side, lift, prescribed)
+
 
 def solve_steady(
-    network: ContactNetwork,
+    medium: Medium,
     axes: tuple[int, ...],
     *,
     method: str = "chord",
-    conductivity: ArrayLike = 1.0,
-    contact_resistance: ArrayLike = 0.0,
     tolerance: float = 1e-10,
     modes: int | None = None,
     backbone: Backbone | None = None,
@@ -93,17 +148,12 @@ def solve_steady(
 
     Parameters
     ----------
-    network : ContactNetwork
-        Of disks or spheres.
+    medium : Medium
+        Of disks or spheres, with a contact network.
     axes : tuple of int
         A single walled axis, or periodic axes only.
     method : str
         A name of `etc_engine.engines.dtem.methods.METHODS`.
-    conductivity : float or array_like, shape (n,) [W/(m K)]
-        Of all particles, or of each.
-    contact_resistance : float or array_like, shape (m + w,) [m K/W]
-        Total resistance of a contact per unit thickness; of all, or of each particle contact and then each
-        wall contact.
     tolerance : float
         Relative error of the conductivity left by the solver.
     modes : int, optional
@@ -123,112 +173,26 @@ def solve_steady(
     ----------
     Feng, Han, Li, Owen 2008, Box 1, doi:10.1016/j.jcp.2008.01.031.
     """
-    dimension = network.packing.dimension
-    material = make_material(network, conductivity, contact_resistance)
-    variant, modes = find_method(method, dimension), flux_modes(method, modes, dimension)
-    if backbone is None:
-        backbone = find_backbone(network, axes)
-    driven = driven_walls(network, axes)
-    cuts = NO_CUTS
-    if variant.exact_cuts:
-        backbone = restore_dead_ends(network, backbone)
-        cuts = insulated_cuts(network, driven)
-    kept = np.concatenate([backbone.contacts, backbone.wall_contacts])
-    reduced = network.select(backbone.contacts, backbone.wall_contacts)
-    sides = contact_sides(reduced, cuts)
-    check_arcs(sides)
-    if not kept.all():  # what carries no heat must still be a valid geometry
-        check_arcs(contact_sides(network.select(np.ones_like(backbone.contacts), driven)))
-    elements = variant.elements(sides, replace(material, contact_resistance=material.contact_resistance[kept]), modes)
-    system = assemble(elements, *prescribe(reduced, axes, backbone, sides, elements.modes))
-    u, reports = _solve(system, elements.modes, tolerance)
+    made = element_geometry(medium, axes, method, modes, backbone)
+    check_arcs(made.sides)
+    if made.every_side is not None:
+        check_arcs(made.every_side)
+    elements = made.variant.elements(made.sides, made.conductivity, made.modes)
+    system = assemble(elements, made.lift, made.prescribed)
+    # a uniform temperature lives on mode 0 alone
+    uniform = (np.flatnonzero(system.free >= 0) % made.modes == 0).astype(np.float64)
+    u, reports = solve_loads(system.matrix, system.rhs, system.lift_energies, tolerance=tolerance, conserved=uniform)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
     return SteadySolution(
-        network=network,
+        medium=medium,
         axes=axes,
-        backbone=backbone,
-        sides=sides,
+        backbone=made.backbone,
+        sides=made.sides,
         method=method,
-        material=material,
-        temperatures=temperatures[:: elements.modes],
-        flows=flows.reshape(sides.nodes.size, elements.modes, len(axes)),
+        temperatures=temperatures[:: made.modes],
+        flows=flows.reshape(made.sides.nodes.size, made.modes, len(axes)),
         energies=temperatures.T @ flows,
         reports=reports,
         positive_off_diagonals=count_positive_off_diagonals(system.matrix),
     )
-
-
-def driven_walls(network: ContactNetwork, axes: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Wall contacts whose wall has a prescribed temperature, shape (w,)."""
-    return np.asarray((network.walls // 2 == axes[0]) & (not network.packing.box.periodic[axes[0]]))
-
-
-def make_material(network: ContactNetwork, conductivity: ArrayLike, contact_resistance: ArrayLike) -> Material:
-    """The material of a network, arguments as in `solve_steady`."""
-    return Material(
-        per_particle(conductivity, network.packing.count, "conductivity"),
-        _positive(contact_resistance, network.count + network.walls.size, "contact resistance", zero=True),
-    )
-
-
-def prescribe(
-    reduced: ContactNetwork, axes: tuple[int, ...], backbone: Backbone, sides: ContactSides, modes: int
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Lift and prescribed nodes: the walls of a walled axis, or the jumps of periodic axes and a pinned node a cluster.
-
-    Walls and jumps are uniform over a contact: they load mode 0, and a wall holds the other modes at 0.
-    """
-    m = reduced.count
-    prescribed = np.zeros((m + reduced.walls.size, modes), dtype=np.bool_)
-    lift = np.zeros((sides.nodes.size, modes, len(axes)))
-    if reduced.packing.box.periodic[axes[0]]:
-        _, first = np.unique(backbone.clusters[reduced.pairs[:, 0]], return_index=True)
-        prescribed[first, 0] = True
-        lift[:, 0, :] = sides.arms[:, list(axes)]
-    else:
-        prescribed[m:] = True
-        lift[:, 0, 0] = np.concatenate([np.zeros(m), 1.0 - reduced.walls % 2])[sides.nodes]
-    return lift.reshape(-1, len(axes)), prescribed.ravel()
-
-
-def _solve(system: LinearSystem, modes: int, tolerance: float) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
-    """Free temperatures of all loads; a uniform temperature lives on mode 0 alone."""
-    if system.matrix.shape[0] == 0:  # every node is a wall or pinned
-        return np.zeros(system.rhs.shape), tuple(
-            SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0) for _ in system.lift_energies
-        )
-    preconditioner = build_preconditioner(system.matrix)
-    uniform = (np.flatnonzero(system.free >= 0) % modes == 0).astype(np.float64)
-    u = np.empty(system.rhs.shape)
-    reports = []
-    for load, lift_energy in enumerate(system.lift_energies):
-        u[:, load], report = solve_energy(
-            system.matrix,
-            np.ascontiguousarray(system.rhs[:, load]),
-            float(lift_energy),
-            preconditioner=preconditioner,
-            tolerance=tolerance,
-            conserved=uniform,
-        )
-        reports.append(report)
-    return u, tuple(reports)
-
-
-def per_particle(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
-    """A positive value of each particle, from one number or an array."""
-    return _positive(values, count, name, zero=False)
-
-
-def _positive(values: ArrayLike, size: int, name: str, *, zero: bool) -> NDArray[np.float64]:
-    """One value for each, all of them finite and positive (or zero where allowed)."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.ndim and array.shape != (size,):
-        raise InputError(f"the {name} must be one number or an array of shape ({size},), found {array.shape}")
-    bad = ~(np.abs(array) <= LARGEST) | ((array < 0.0) if zero else (array < 1.0 / LARGEST))
-    if bad.any():
-        found = array[bad].flat[0]
-        if found > 0.0 and np.isfinite(found):
-            raise InputError(f"the {name} must lie between {1.0 / LARGEST:g} and {LARGEST:g}, found {found:g}")
-        raise InputError(f"the {name} must be {'>= 0' if zero else 'positive'} and finite, found {found:g}")
-    return np.broadcast_to(array, (size,))

@@ -62,11 +62,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Elements, Material, cholesky_inverse, packed_starts
+from etc_engine.engines.dtem.element import Elements, Resistances, cholesky_inverse, packed_starts
 from etc_engine.engines.dtem.methods import find_method, flux_modes
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.by_dimension import law_of, length_scales
-from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import ContactSides
 
 SIMPLEX: Mapping[int, NDArray[np.float64]] = {
@@ -84,18 +83,23 @@ def readings_of_parts(dimension: int) -> NDArray[np.float64]:
 
 
 def storing_elements(
-    sides: ContactSides, material: Material, method: str, *, dipoles: bool = False, modes: int | None = None
+    sides: ContactSides,
+    conductivity: NDArray[np.float64],
+    method: str,
+    *,
+    dipoles: bool = False,
+    modes: int | None = None,
 ) -> Elements:
     """Elements of all particles over their contacts and their states, which are temperatures that store heat.
 
     Parameters
     ----------
     sides : ContactSides
-    material : Material
+    conductivity : ndarray, shape (n,) [W/(m K)]
     method : str
         A name of `etc_engine.engines.dtem.methods.METHODS`, but for ``exact``.
     dipoles : bool
-        d + 1 states a particle, its parts; otherwise one, its mean.
+        d + 1 states per particle, its parts; otherwise one, its mean.
     modes : int, optional
         Flux modes of a contact, with ``arc``.
 
@@ -103,7 +107,7 @@ def storing_elements(
     -------
     Elements
         Rows of a particle: its contacts, modes fastest, then its states. Nodes: M times the contact plus the mode, and
-        after all contacts the states by particle. ``modes`` is M. ``apply`` answers the heat into the particle at
+        after all contacts the states by particle. ``modes`` is M. ``apply`` returns the heat into the particle at
         the contacts, and what the states lose.
 
     Raises
@@ -117,7 +121,7 @@ def storing_elements(
     variant, modes = find_method(method, dimension), flux_modes(method, modes, dimension)
     if variant.resistances is None:
         raise InputError(f"method {method} has no transient form: choose chord, arc, standard or enhanced")
-    h = variant.resistances(sides, material, modes)
+    h = variant.resistances(sides, conductivity, modes)
     states = dimension + 1 if dipoles else 1
     count = sides.offsets.size - 1
     contact_rows = modes * np.diff(sides.offsets)
@@ -126,11 +130,8 @@ def storing_elements(
     values = np.zeros(int(starts[-1]))
     bad = _fill(
         modes * sides.offsets,
-        h.starts,
-        h.values,
-        h.moments,
-        modes,
-        material.conductivity * length_scales(sides.radii, dimension),
+        h,
+        np.ascontiguousarray(conductivity * length_scales(sides.radii, dimension)),
         (law.warming, law.harmonic, law.share),
         readings_of_parts(dimension) if dipoles else np.ones((1, 1)),
         starts,
@@ -160,55 +161,27 @@ def _indefinite(particle: int, sides: ContactSides, method: str, dipoles: bool) 
     )
 
 
-def stored_areas(network: ContactNetwork, method: str) -> NDArray[np.float64]:
-    """Area of each disk [m2], or volume of each sphere [m3], that stores heat, shape (n,).
-
-    V = pi R^2 - sum_i R^2 (alpha_i - sin alpha_i cos alpha_i) over the contacts that cut a disk,
-    V = 4 pi R^3/3 - sum_i pi R^3 (1 - cos alpha_i)^2 (2 + cos alpha_i)/3 over those that cut a sphere.
-
-    Parameters
-    ----------
-    network : ContactNetwork
-    method : str
-
-    Notes
-    -----
-    Geometric contacts, walls of all kinds included, cut a particle; so do prescribed ones with ``chord``.
-    With the other methods prescribed contacts cut nothing off. Segments are taken for disjoint, as contacts must be.
-    """
-    packing = network.packing
-    areas = packing.measures.copy()
-    if network.geometric or method in {"chord", "exact"}:
-        owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
-        alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
-        segments = law_of(packing.dimension).cut(alpha)
-        areas -= packing.radii**packing.dimension * np.bincount(owner, segments, minlength=packing.count)
-    return np.asarray(areas)
-
-
 @njit(cache=True)
 def _fill(
     offsets: NDArray[np.int64],
-    h_starts: NDArray[np.int64],
-    h_values: NDArray[np.float64],
-    moments: NDArray[np.float64],
-    modes: int,
+    h: Resistances,
     scales: NDArray[np.float64],
     constants: tuple[float, float, float],
     readings: NDArray[np.float64],
     starts: NDArray[np.int64],
     values: NDArray[np.float64],
 ) -> int:
-    """Fill the packed matrices; answers the first particle without a positive definite one, or -1.
+    """Fill the packed matrices; returns the first particle without a positive definite one, or -1.
 
-    ``scales`` are kappa R^(d-2), ``constants`` warming, harmonic and share of the law; ``readings`` turns the states
-    into (T_o) or (T_o, D).
+    A = (H' + warming e e^T/scale - share harmonic sum_d u_d u_d^T/scale)^-1 and G = e W_0 + share sum_d u_d W_d, joined
+    to the element of `_join`. ``scales`` are kappa R^(d-2), ``constants`` warming, harmonic and share of the law;
+    ``readings`` turns the states into (T_o) or (T_o, D).
     """
     warming, harmonic, share = constants
-    states = readings.shape[0]
+    states, modes, moments = readings.shape[0], h.modes, h.moments
     for p in range(offsets.size - 1):
         first, n = offsets[p], offsets[p + 1] - offsets[p]
-        a = h_values[h_starts[p] : h_starts[p + 1]].copy().reshape((n, n))
+        a = h.values[h.starts[p] : h.starts[p + 1]].copy().reshape((n, n))
         g = np.zeros((n, states))  # temperature of each row by the states alone
         for i in range(n):
             if i % modes == 0:

@@ -11,150 +11,36 @@ of the steady method of the same name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_matrix, diags_array
+from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.element import Elements
-from etc_engine.engines.dtem.steady import make_material, per_particle
-from etc_engine.engines.dtem.storage import readings_of_parts, stored_areas, storing_elements
-from etc_engine.errors import InputError
-from etc_engine.medium.network import ContactNetwork
-from etc_engine.medium.sides import ContactSides, check_arcs, contact_sides
-from etc_engine.medium.wall_nodes import FIRM, WallNodes, number_nodes
-from etc_engine.medium.walls import Insulated, WallCondition, wall_conditions
-from etc_engine.packing.particles import particle_values
-from etc_engine.solvers.marching import HeatSystem
-
-Source = ArrayLike | Callable[[float], ArrayLike]
+from etc_engine.engines.dtem.storage import readings_of_parts, storing_elements
+from etc_engine.medium.medium import Medium, check_conductors
+from etc_engine.medium.sides import check_arcs, contact_sides
+from etc_engine.medium.transient import ParticleSystem, Source, joined_walls, particle_capacities, state_source
+from etc_engine.medium.wall_nodes import heat_system, number_nodes
+from etc_engine.medium.walls import WallCondition, wall_conditions
 
 
-@dataclass(frozen=True, eq=False)
-class TransientSystem:
-    """A contact network ready to be marched in time, and how its unknowns are read.
-
-    Parameters
-    ----------
-    heat : HeatSystem
-        Of the unknowns: free contact nodes, plates of walls, then the states by particle. Its heat rates are those
-        into the particles from the walls 0, 1, ... of the box, and from the sources.
-    network : ContactNetwork
-    sides : ContactSides
-        Of the contacts that may carry heat; insulated walls are left out. Their nodes count the particle contacts
-        and then ``wall_contacts``.
-    wall_contacts : ndarray of int
-        Wall contacts of the network that take part.
-    elements : Elements
-    walls : WallNodes
-        The unknown or the wall of each node of the elements.
-    states : int
-        Of a particle: 1, or d + 1 with dipoles.
-    """
-
-    heat: HeatSystem
-    network: ContactNetwork
-    sides: ContactSides
-    wall_contacts: NDArray[np.int64]
-    elements: Elements
-    walls: WallNodes
-    states: int
-
-    def initial(self, temperatures: ArrayLike | Callable[[NDArray[np.float64]], ArrayLike]) -> NDArray[np.float64]:
-        """Unknowns of particles that are isothermal: a value, one for each, or a function of the centres (n, d).
-
-        Raises
-        ------
-        InputError
-            If they are not finite or not as many as the particles.
-        """
-        centers = self.network.packing.centers
-        given = temperatures(centers) if callable(temperatures) else temperatures
-        particles = particle_values(given, centers.shape[0], "initial temperature")
-        start = np.full(self.heat.capacity.size, particles.mean())
-        start[start.size - self.states * particles.size :] = np.repeat(particles, self.states)
-        return start
-
-    def particle_temperatures(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Mean temperature of each particle, shape (n,) [K]."""
-        return np.asarray(self._states(temperatures).mean(axis=1))
-
-    def dipoles(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Amplitudes D of each particle's linear part, shape (n, d) [K]; zero where there are no such states."""
-        states, dimension = self._states(temperatures), self.network.packing.dimension
-        if self.states == 1:
-            return np.zeros((states.shape[0], dimension))
-        return np.asarray(states @ readings_of_parts(dimension)[1:].T)
-
-    def contact_temperatures(self, time: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Node temperature of each particle contact, then of each wall contact that takes part [K]."""
-        count = self.network.count + self.wall_contacts.size
-        return self._nodes(time, temperatures)[: self.elements.modes * count : self.elements.modes]
-
-    def _states(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        return temperatures[temperatures.size - self.states * self.network.packing.count :].reshape(-1, self.states)
-
-    def _nodes(self, time: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        known = np.append(temperatures, 0.0)[self.walls.unknowns]
-        return np.asarray(known + self.walls.fixed @ self.walls.temperatures(time))
-
-
-def contact_flows(system: TransientSystem, time: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Heat flow into the particle at each contact side, Q = A (T_c - T_o e), shape (s,) [W/m].
-
-    Parameters
-    ----------
-    system : TransientSystem
-    time : float [s]
-    temperatures : ndarray, shape (n,) [K]
-        Unknowns at that time, say of a `MarchState`.
-
-    Returns
-    -------
-    ndarray
-        By ``system.sides``; equal and opposite on the two sides of a particle contact.
-    """
-    rows = system._nodes(time, temperatures)[system.elements.nodes]
-    flows = system.elements.apply(rows[:, None])[:, 0]
-    contacts = system.elements.modes * (system.network.count + system.wall_contacts.size)
-    return np.asarray(flows[system.elements.nodes < contacts][:: system.elements.modes])
-
-
-def particle_sides(system: TransientSystem, particle: int) -> slice:
-    """Rows of one particle among the sides, and so among the flows of `contact_flows`.
-
-    Raises
-    ------
-    InputError
-        If there is no such particle.
-    """
-    count = system.network.packing.count
-    if not 0 <= particle < count:
-        raise InputError(f"there is no particle {particle}: they are numbered from 0 to {count - 1}")
-    return slice(int(system.sides.offsets[particle]), int(system.sides.offsets[particle + 1]))
-
-
-def transient_system(
-    network: ContactNetwork,
+def element_system(
+    medium: Medium,
     walls: Mapping[str, WallCondition],
     *,
     method: str = "chord",
     dipoles: bool = False,
     modes: int | None = None,
-    conductivity: ArrayLike = 1.0,
-    heat_capacity: ArrayLike = 1.0,
-    contact_resistance: ArrayLike = 0.0,
     source: Source = 0.0,
-) -> TransientSystem:
+    capacities: NDArray[np.float64] | None = None,
+) -> ParticleSystem:
     """Storing elements of all particles, assembled, with the conditions at the walls of the box.
 
     Parameters
     ----------
-    network : ContactNetwork
-        Rattlers and dead ends take part: they keep or take up heat.
+    medium : Medium
+        With contacts and heat capacities. Rattlers and dead ends take part: they keep or take up heat.
     walls : mapping of str to condition
         By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
     method : str
@@ -163,18 +49,15 @@ def transient_system(
         Whether the particles have dipole states, for earlier times.
     modes : int, optional
         Flux modes of a contact, with ``arc``.
-    conductivity : float or array_like, shape (n,) [W/(m K)]
-        Of all particles, or of each.
-    heat_capacity : float or array_like, shape (n,) [J/(m3 K)]
-        rho c of all particles, or of each.
-    contact_resistance : float or array_like, shape (m + w,) [m K/W]
-        As in `etc_engine.engines.dtem.steady.solve_steady`.
-    source : float, array_like, shape (n,), or callable of t [W/m]
-        Heat set free evenly in all particles, or in each, per unit thickness.
+    source : float, array_like, shape (n,), or callable of t [W, in 2D W/m]
+        Heat set free evenly in all particles, or in each.
+    capacities : ndarray, shape (n,), optional [J/(m K)]
+        Of the particles; rho c times what their contacts leave of them by default.
 
     Returns
     -------
-    TransientSystem
+    ParticleSystem
+        With d + 1 states per particle with dipoles, otherwise 1.
 
     Raises
     ------
@@ -189,11 +72,12 @@ def transient_system(
     face of the box. After a step of flux, T_i - T_o is good to 1 % of its final value from the Fourier number
     kappa t/(rho c R^2) = 0.35 .. 1.25, with dipoles 0.12 .. 0.41, depending on where the contacts lie.
 
-    The heat balance of `march` is exact where its solver is (small systems) and with one flux mode a contact; with
+    The heat balance of `march` is exact where its solver is (small systems) and with one flux mode per contact; with
     ``arc`` and an iterative solver it holds to the solver's tolerance.
 
-    At rest the temperatures are those of `solve_steady`; of ``arc`` on the backbone alone, since here dead ends take
-    fluxes of no sum from the contacts that hold them, which shifts the others by some 1e-5.
+    At rest the temperatures are those of `etc_engine.engines.dtem.steady.solve_steady`; of ``arc`` on the backbone
+    alone, since here dead ends take fluxes of no sum from the contacts that hold them, which shifts the others by
+    some 1e-5.
 
     Examples
     --------
@@ -201,82 +85,47 @@ def transient_system(
     >>> from etc_engine.solvers.marching import march
     >>> from etc_engine.medium.walls import FixedTemperature
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.5], Box((1.0, 1.0)))
-    >>> system = transient_system(bonded_contacts(disk, 0.2), {"left": FixedTemperature(1.0)})
+    >>> medium = Medium(disk, 1.0, bonded_contacts(disk, 0.2), heat_capacity=1.0)
+    >>> system = element_system(medium, {"left": FixedTemperature(1.0)})
     >>> *_, late = march(system.heat, system.initial(0.0), [0.0, 40.0], steps=200)
     >>> system.particle_temperatures(late.temperatures).round(6)
     array([1.])
     """
-    conditions = wall_conditions(network.packing.box, walls)
-    kept = np.array([not isinstance(c, Insulated) for c in conditions])[network.walls]
-    everywhere = np.ones(network.count, dtype=np.bool_)
-    reduced = network.select(everywhere, kept)
-    whole = make_material(network, conductivity, contact_resistance)
-    material = replace(whole, contact_resistance=whole.contact_resistance[np.concatenate([everywhere, kept])])
-    density = per_particle(heat_capacity, network.packing.count, "heat capacity")
+    check_conductors(medium)
+    network, n, states = medium.links, medium.packing.count, medium.dimension + 1 if dipoles else 1
+    conditions = wall_conditions(medium.box, walls)
+    kept = joined_walls(network.walls, conditions)
+    reduced = network.select(np.ones(network.count, dtype=np.bool_), kept)
     sides = contact_sides(reduced)
     check_arcs(sides)
-    elements = storing_elements(sides, material, method, dipoles=dipoles, modes=modes)
-    states = network.packing.dimension + 1 if dipoles else 1
-    capacities = np.repeat(density * stored_areas(network, method) / states, states)
-    nodes = number_nodes(reduced, conditions, elements.modes, capacities.size)
-    return TransientSystem(
-        heat=_heat_system(elements, nodes, capacities, _source(source, density.size, states)),
-        network=network,
-        sides=sides,
-        wall_contacts=np.flatnonzero(kept),
-        elements=elements,
-        walls=nodes,
-        states=states,
+    elements = storing_elements(sides, medium.conductivity, method, dipoles=dipoles, modes=modes)
+    stored = np.repeat(particle_capacities(medium, capacities, cut=method == "chord") / states, states)
+    nodes = number_nodes(
+        medium.box, reduced.walls, conditions, contacts=network.count, modes=elements.modes, states=stored.size
     )
+    count = nodes.unknowns.size
+    whole = assemble(elements, np.zeros((elements.nodes.size, 0)), np.zeros(count, dtype=np.bool_)).matrix
+    system = heat_system(whole, nodes, stored, state_source(source, n, states))
+
+    def flows(time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Q = A (T_c - T_o e)."""
+        rows = made.node_temperatures(time, unknowns)[elements.nodes]
+        at_contacts = elements.nodes < count - stored.size
+        return np.ascontiguousarray(elements.apply(rows[:, None])[at_contacts, 0][:: elements.modes])
+
+    made = ParticleSystem(system, medium, nodes, sides, np.flatnonzero(kept), flows, elements.modes)
+    return made
 
 
-def _source(source: Source, count: int, states: int) -> Callable[[float], NDArray[np.float64]]:
-    """Heat set free in each state [W/m]."""
-
-    def spread(values: ArrayLike) -> NDArray[np.float64]:
-        return np.repeat(particle_values(values, count, "source") / states, states)
-
-    if callable(source):
-        return lambda t: spread(source(t))
-    constant = spread(source)
-    return lambda _: constant
+def dipole_amplitudes(system: ParticleSystem, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Amplitudes D of each particle's linear part, shape (n, d) [K]; zero where there are no such states."""
+    states, dimension = system.state_temperatures(unknowns), system.medium.dimension
+    if system.states == 1:
+        return np.zeros((states.shape[0], dimension))
+    return np.asarray(states @ readings_of_parts(dimension)[1:].T)
 
 
-def _heat_system(
-    elements: Elements,
-    walls: WallNodes,
-    capacities: NDArray[np.float64],
-    source: Callable[[float], NDArray[np.float64]],
-) -> HeatSystem:
-    """Elements summed over shared nodes, the contacts of a plate folded into one."""
-    lift = walls.fixed[elements.nodes].toarray()
-    free = np.flatnonzero(walls.unknowns >= 0)
-    system = assemble(elements, lift, walls.unknowns < 0)
-    fold = csr_matrix((np.ones(free.size), (np.arange(free.size), walls.unknowns[free])), shape=(free.size, walls.size))
-    plates = np.flatnonzero(walls.plates >= 0)
-    exchange = np.zeros(walls.size)
-    nodes = walls.plates[plates]
-    exchange[nodes] = walls.exchange[plates]
-    elements_alone = csr_matrix(fold.T @ system.matrix @ fold)
-    matrix = csr_matrix(elements_alone + diags_array(exchange))
-    matrix.sort_indices()
-    behind = elements_alone[nodes]
-    by_film = exchange[nodes] <= FIRM * elements_alone.diagonal()[nodes]
-    links = np.asarray(fold.T @ system.rhs)  # conductances between unknowns and walls of given temperature
-    own = lift.T @ elements.apply(lift)
-
-    def load(t: float) -> NDArray[np.float64]:
-        f = links @ walls.temperatures(t)
-        f[walls.size - capacities.size :] += source(t)
-        f[nodes] += walls.plate_heat(t)[plates]
-        return np.asarray(f)
-
-    def heat_rates(t: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
-        rates = walls.plate_heat(t) + own @ walls.temperatures(t) - links.T @ temperatures
-        through_film = rates[plates] - (exchange * temperatures)[nodes]
-        into_elements = behind @ temperatures - (links @ walls.temperatures(t))[nodes]
-        rates[plates] = np.where(by_film, through_film, into_elements)
-        return np.append(rates, source(t).sum())
-
-    capacity = np.concatenate([np.zeros(walls.size - capacities.size), capacities])
-    return HeatSystem(capacity, matrix, load, heat_rates)
+def contact_temperatures(system: ParticleSystem, time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Node temperature of each particle contact, then of each wall contact that takes part [K]."""
+    nodes = system.node_temperatures(time, unknowns)
+    return nodes[: nodes.size - system.nodes.states : system.modes]

@@ -12,7 +12,6 @@ from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.engines.lattice.fitted import fitted_seeds
 from etc_engine.engines.lattice.network import TRANSMISSIONS, Lattice, contact_lattice, laguerre_lattice
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.composite import Composite
 from etc_engine.packing.particles import ParticlePacking
 
 SURFACE = 6
@@ -49,7 +48,7 @@ def carve(lattice: Lattice, inside: NDArray[np.bool_]) -> Lattice:
     number = np.cumsum(inside) - 1
     i, j = lattice.pairs.T
     both, first, second = inside[i] & inside[j], inside[i] & ~inside[j], ~inside[i] & inside[j]
-    walls = inside[lattice.wall_nodes]
+    walls = inside[lattice.wall_particles]
     seen_from_j = lattice.crossings[second] - lattice.branches[second]
     cut = np.count_nonzero(first) + np.count_nonzero(second)
     return Lattice(
@@ -60,7 +59,7 @@ def carve(lattice: Lattice, inside: NDArray[np.bool_]) -> Lattice:
         lattice.segments[both],
         lattice.crossings[both],
         lattice.volumes[inside],
-        np.concatenate((number[lattice.wall_nodes[walls]], number[i[first]], number[j[second]])),
+        np.concatenate((number[lattice.wall_particles[walls]], number[i[first]], number[j[second]])),
         np.concatenate((lattice.walls[walls], np.full(cut, SURFACE))),
         np.concatenate((lattice.wall_sections[walls], lattice.sections[first], lattice.sections[second])),
         np.concatenate((lattice.wall_segments[walls], lattice.segments[first, 0], lattice.segments[second, 1])),
@@ -108,7 +107,7 @@ def ball_lattice(
     ball = ParticlePacking([[0.5 * edge] * 3], [radius], box)  # type: ignore[arg-type]
     filled = 4.0 / 3.0 * np.pi * radius**3 / box.volume
     if transmission == "laguerre":
-        seeds = fitted_seeds(Composite(ball, 1.0, np.asarray(2.0)), round(count / filled), rng, offset=MIDDLE)
+        seeds = fitted_seeds(ball, round(count / filled), rng, offset=MIDDLE)
         return carve(laguerre_lattice(seeds.packing), seeds.owner == 0)
     packing = pack_lattice(round(count / filled), box.lengths, rng)
     return _ball_of_contacts(contact_lattice(packing, transmission=coefficient), radius)
@@ -120,12 +119,12 @@ def _ball_of_contacts(lattice: Lattice, radius: float) -> Lattice:
     away = packing.centers - 0.5 * np.asarray(packing.box.lengths)
     inside = np.linalg.norm(away, axis=1) < radius
     body = carve(lattice, inside)
-    start, along = away[inside][body.wall_nodes], body.wall_crossings
+    start, along = away[inside][body.wall_particles], body.wall_crossings
     along = along / np.linalg.norm(along, axis=1)[:, None]
     rise = (start * along).sum(axis=1)
     lengths = -rise + np.sqrt(rise**2 + radius**2 - (start**2).sum(axis=1))
     # a centre on the surface takes its temperature; a hundredth of the radius is close enough
-    lengths = np.maximum(lengths, 0.01 * packing.radii[inside][body.wall_nodes])
+    lengths = np.maximum(lengths, 0.01 * packing.radii[inside][body.wall_particles])
     return replace(
         body,
         volumes=body.volumes * (4.0 / 3.0 * np.pi * radius**3 / body.volumes.sum()),

@@ -11,10 +11,11 @@ from scipy.spatial import cKDTree
 from etc_engine.box import Box
 from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.errors import GeometryError
-from etc_engine.medium.composite import MATRIX, Composite
+from etc_engine.medium.phases import PORE, find_owners
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.laguerre import laguerre_facets
+from etc_engine.structure.union import solid_fraction
 
 OFFSET = 0.15
 """Distance of the two seeds of a pair from their interface, in seed spacings."""
@@ -53,7 +54,7 @@ class FittedSeeds:
     packing : ParticlePacking
         Seeds of equal weight.
     owner : ndarray of int64, shape (n,)
-        Row number of the inclusion, `etc_engine.medium.composite.MATRIX` for none.
+        Row number of the inclusion, `etc_engine.medium.phases.PORE` for none.
     """
 
     packing: ParticlePacking
@@ -71,9 +72,9 @@ class _Pairs:
 
 
 def fitted_seeds(
-    composite: Composite, count: int, rng: np.random.Generator, box: Box | None = None, offset: float = OFFSET
+    packing: ParticlePacking, count: int, rng: np.random.Generator, box: Box | None = None, offset: float = OFFSET
 ) -> FittedSeeds:
-    r"""About `count` seeds whose Laguerre facets follow the surfaces of spherical inclusions.
+    r"""About `count` seeds whose Laguerre facets follow the surfaces of spherical packing.
 
     Pairs of seeds mirror each other in the tangent planes of a sphere, at :math:`a' (1 \pm \delta / a')`; the facet
     between them is part of that plane. The polyhedron about the sphere would be too large, so its radius is tuned,
@@ -85,14 +86,14 @@ def fitted_seeds(
 
     Parameters
     ----------
-    composite : Composite
-        Spheres in a matrix.
+    packing : ParticlePacking
+        The packing.
     count : int
         Number of seeds wanted; met within some per cent, but where spheres have less than a few seeds across, their
         surfaces take more.
     rng : numpy.random.Generator
     box : Box, optional
-        The box of the lattice, where it has walls that the composite does not; the composite's by default.
+        The box of the lattice, where it has walls that the packing does not; the packing's by default.
     offset : float
         Distance of the seeds of a pair from the interface, in seed spacings; 0.15 is best for the conductivity, 0.4,
         near the middle of the cells, for a transient.
@@ -116,33 +117,31 @@ def fitted_seeds(
     Examples
     --------
     >>> sphere = ParticlePacking([[0.5, 0.5, 0.5]], [0.3], Box((1.0, 1.0, 1.0), (True, True, True)))
-    >>> composite = Composite(sphere, 1.0, 5.0)
-    >>> seeds = fitted_seeds(composite, 300, np.random.default_rng(4))
+    >>> seeds = fitted_seeds(sphere, 300, np.random.default_rng(4))
     >>> inside = laguerre_facets(seeds.packing).volumes[seeds.owner == 0].sum()
-    >>> bool(abs(inside / composite.volume_fraction - 1.0) < 1e-6)
+    >>> bool(abs(inside / solid_fraction(sphere) - 1.0) < 1e-6)
     True
     """
-    inclusions = composite.inclusions
-    box = box or inclusions.box
+    box = box or packing.box
     if box.dimension != 3:
         raise GeometryError(f"fitted seeds need a three-dimensional box, found {box.dimension} dimensions")
-    h = _spacing(composite, count, box)
-    small = int(np.argmin(inclusions.radii))
-    if inclusions.radii[small] < SMALLEST * h:
-        needed = int(np.ceil(box.volume * (SMALLEST / float(inclusions.radii[small])) ** 3))
+    h = _spacing(packing, count, box)
+    small = int(np.argmin(packing.radii))
+    if packing.radii[small] < SMALLEST * h:
+        needed = int(np.ceil(box.volume * (SMALLEST / float(packing.radii[small])) ** 3))
         raise GeometryError(
-            f"inclusion {small} of radius {inclusions.radii[small]:.4g} is too small for {count} lattice particles: "
+            f"inclusion {small} of radius {packing.radii[small]:.4g} is too small for {count} lattice particles: "
             f"use at least {needed}"
         )
-    pairs = _pairs_on_spheres(inclusions, h, offset * h, rng)
+    pairs = _pairs_on_spheres(packing, h, offset * h, rng)
     bulk = pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.5, spread=0.0).centers
-    bulk = bulk[_interface_distance(composite, bulk) > CLEARANCE * h]
-    return _tuned(composite, pairs, bulk, h, box)
+    bulk = bulk[_interface_distance(packing, bulk) > CLEARANCE * h]
+    return _tuned(packing, pairs, bulk, h, box)
 
 
-def _spacing(composite: Composite, count: int, box: Box) -> float:
+def _spacing(packing: ParticlePacking, count: int, box: Box) -> float:
     """Seed spacing for which pairs on the spheres and the seeds that make room for them come to `count` in all."""
-    radii = composite.inclusions.radii
+    radii = packing.radii
     h = float((box.volume / count) ** (1.0 / 3.0))
     for _ in range(30):
         more = 4.0 * np.pi * float((radii**2).sum()) * (2.0 / PATCH - 2.0 * CLEARANCE) / h**2
@@ -196,14 +195,13 @@ def _spread_directions(number: int, rng: np.random.Generator) -> NDArray[np.floa
     )
 
 
-def _interface_distance(composite: Composite, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _interface_distance(packing: ParticlePacking, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distance of points to the nearest surface of a sphere; large for points far from all."""
-    inclusions = composite.inclusions
-    box = inclusions.box
+    box = packing.box
     tree = cKDTree(box.wrap(points), boxsize=np.where(box.periodic, box.lengths, 0.0))
     h = float((box.volume / max(len(points), 1)) ** (1.0 / 3.0))
     distance = np.full(len(points), np.inf)
-    for center, radius in zip(inclusions.centers, inclusions.radii, strict=True):
+    for center, radius in zip(packing.centers, packing.radii, strict=True):
         rows = np.asarray(tree.query_ball_point(center, radius + 2.0 * h), dtype=np.int64)
         away = np.linalg.norm(box.minimum_image(points[rows] - center), axis=1)
         distance[rows] = np.minimum(distance[rows], np.abs(away - radius))
@@ -211,29 +209,28 @@ def _interface_distance(composite: Composite, points: NDArray[np.float64]) -> ND
 
 
 def _assemble(
-    composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: float, kappa: float, box: Box
+    packing: ParticlePacking, pairs: _Pairs, bulk: NDArray[np.float64], h: float, kappa: float, box: Box
 ) -> FittedSeeds:
     """Seeds for a tuned radius."""
-    inclusions = composite.inclusions
-    a = inclusions.radii[pairs.sphere]
+    a = packing.radii[pairs.sphere]
     tuned = a * (1.0 - kappa * (h / a) ** 2)
-    middle = inclusions.centers[pairs.sphere]
+    middle = packing.centers[pairs.sphere]
     inner = middle + (tuned - pairs.offset)[:, None] * pairs.normal
     outer = (middle + (tuned + pairs.offset)[:, None] * pairs.normal)[pairs.outer]
-    points = inclusions.box.wrap(np.concatenate((inner, outer, bulk)))
-    owner = np.concatenate((pairs.sphere, np.full(len(outer), MATRIX), composite.phase(bulk)))
+    points = packing.box.wrap(np.concatenate((inner, outer, bulk)))
+    owner = np.concatenate((pairs.sphere, np.full(len(outer), PORE), find_owners(packing, bulk)))
     kept = np.asarray((np.asarray(box.periodic) | ((points > 0.0) & (points < np.asarray(box.lengths)))).all(axis=1))
     return FittedSeeds(ParticlePacking(points[kept], np.full(int(kept.sum()), WEIGHT * h), box), owner[kept])
 
 
-def _tuned(composite: Composite, pairs: _Pairs, bulk: NDArray[np.float64], h: float, box: Box) -> FittedSeeds:
+def _tuned(packing: ParticlePacking, pairs: _Pairs, bulk: NDArray[np.float64], h: float, box: Box) -> FittedSeeds:
     """Secant iteration on kappa until the inclusions' cells have the exact volume."""
-    goal = composite.volume_fraction * composite.inclusions.box.volume
+    goal = solid_fraction(packing) * packing.box.volume
 
     def excess(kappa: float) -> tuple[float, FittedSeeds]:
-        seeds = _assemble(composite, pairs, bulk, h, kappa, box)
+        seeds = _assemble(packing, pairs, bulk, h, kappa, box)
         volumes = laguerre_facets(seeds.packing).volumes
-        return float(volumes[seeds.owner != MATRIX].sum()) / goal - 1.0, seeds
+        return float(volumes[seeds.owner != PORE].sum()) / goal - 1.0, seeds
 
     low, high = 0.06, 0.08
     error_low, error_high = excess(low)[0], 0.0

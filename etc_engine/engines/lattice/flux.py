@@ -59,7 +59,7 @@ def flux_moments(field: SteadyField) -> NDArray[np.float64]:
         moments[:, axis] = (
             np.bincount(i, flows * crossing, minlength=lattice.count)
             + np.bincount(j, flows * (lattice.branches[:, axis] - crossing), minlength=lattice.count)
-            + np.bincount(lattice.wall_nodes, walls * lattice.wall_crossings[:, axis], minlength=lattice.count)
+            + np.bincount(lattice.wall_particles, walls * lattice.wall_crossings[:, axis], minlength=lattice.count)
         )
     return moments
 

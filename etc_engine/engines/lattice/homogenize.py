@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,14 @@ from etc_engine.engines.lattice.network import (
     laguerre_lattice,
     link_conductances,
 )
-from etc_engine.engines.lattice.steady import LatticeConductivity, conductivity_tensor
+from etc_engine.engines.lattice.steady import conductivity_tensor
 from etc_engine.errors import GeometryError, InputError, PackingError
 from etc_engine.medium.backbone import joined_axes
-from etc_engine.medium.composite import MATRIX, Composite, Homogenized
+from etc_engine.medium.conduction import Conduction, Result, attempt
+from etc_engine.medium.conductivity import EffectiveConductivity
+from etc_engine.medium.links import LinkSolution
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.phases import PORE, check_phases, find_owners, of_owners
 from etc_engine.packing.particles import ParticlePacking
 
 BOUNDARIES = ("periodic", "walls")
@@ -48,7 +53,7 @@ FEWEST = 50
 
 
 def homogenize_lattice(
-    composite: Composite,
+    medium: Medium,
     *,
     rng: np.random.Generator,
     particles: int = 20_000,
@@ -57,14 +62,14 @@ def homogenize_lattice(
     interface_resistance: float = 0.0,
     tolerance: float = 1e-8,
     estimate_error: bool = True,
-) -> Homogenized:
-    """Effective conductivity tensor of a composite by a lattice of particles.
+) -> EffectiveConductivity[LinkSolution]:
+    """Effective conductivity tensor of a medium by a lattice of particles.
 
     Parameters
     ----------
-    composite : Composite
-        Spheres in a matrix. Insulating spheres take no part; perfectly conducting ones have 1e8 times the largest
-        finite conductivity, and are refused where they join across the cell.
+    medium : Medium
+        Spheres and what fills the pores. Insulating spheres take no part; perfectly conducting ones have 1e8 times the
+        largest finite conductivity, and are refused where they join across the cell.
     rng : numpy.random.Generator
         Source of the lattice.
     particles : int
@@ -80,12 +85,12 @@ def homogenize_lattice(
     tolerance : float
         Relative error of the conductivity left by the iterative solver.
     estimate_error : bool
-        Whether a second lattice is solved for ``relative_error_estimate``, about a quarter of the time; NaN otherwise.
+        Whether a second lattice is solved for ``model_error``, about a quarter of the time; NaN otherwise.
 
     Returns
     -------
-    Homogenized
-        ``relative_error_estimate`` is the difference to an independent lattice of a quarter of the particles, relative
+    EffectiveConductivity
+        ``model_error`` is the difference to an independent lattice of a quarter of the particles, relative
         to the conductivity: the error of the finer one where it falls with the power 1.5 of the particles' distance
         (``laguerre`` falls with the power 2 on separate spheres). Where the inclusions are too small for a quarter,
         it is the difference of two lattices of the same size. It covers the lattice, not the choice of the cell.
@@ -101,21 +106,23 @@ def homogenize_lattice(
     Examples
     --------
     >>> sphere = ParticlePacking([[0.5, 0.5, 0.5]], [1 / 3], Box((1.0, 1.0, 1.0), (True, True, True)))
-    >>> made = homogenize_lattice(Composite(sphere, 1.0, 5.0), rng=np.random.default_rng(3), particles=1000)
+    >>> from etc_engine.medium.medium import Pores
+    >>> medium = Medium(sphere, 5.0, pores=Pores(1.0))
+    >>> made = homogenize_lattice(medium, rng=np.random.default_rng(3), particles=1000)
     >>> bool(abs(made.tensor[0, 0] / 1.29213 - 1.0) < 0.003)  # exact for the simple cubic array
     True
     """
     start = time.perf_counter()
     if boundary is None:
-        boundary = "periodic" if all(composite.inclusions.box.periodic) else "walls"
-    _refuse(composite, particles, boundary, transmission)
+        boundary = "periodic" if all(medium.packing.box.periodic) else "walls"
+    _refuse(medium, particles, boundary, transmission)
     if not isinstance(tolerance, (int, float, np.number)) or not 0.0 < tolerance < 1.0:
         raise InputError(f"the tolerance must lie between 0 and 1, found {tolerance!r}")
     if not isinstance(rng, np.random.Generator):
         raise InputError(f"rng is a numpy.random.Generator, found {type(rng).__name__}")
 
     def conduct(count: int) -> _Conducted:
-        return _conduct(composite, rng, count, boundary, transmission, interface_resistance, tolerance)
+        return _conduct(medium, rng, count, boundary, transmission, interface_resistance, tolerance)
 
     fine, error = conduct(particles), np.nan
     if estimate_error:
@@ -125,29 +132,26 @@ def homogenize_lattice(
             other = conduct(particles)
         scale = float(np.abs(np.diag(fine.result.tensor)).max())
         difference = float(np.abs(np.diag(fine.result.tensor - other.result.tensor)).max())
-        conducts = scale > NOTHING * float(
-            node_conductivities(composite, np.arange(-1, composite.inclusions.count)).max()
-        )
+        conducts = scale > NOTHING * float(node_conductivities(medium, np.arange(-1, medium.packing.count)).max())
         error = difference / scale if conducts else 0.0
-    return Homogenized(
-        tensor=fine.result.tensor,
-        volume_fraction=fine.volume_fraction,
+    return replace(
+        fine.result,
         unknowns=fine.nodes,
-        iterations=fine.result.iterations,
-        relative_error_estimate=error,
+        model_error=error,
+        solid_fraction=fine.volume_fraction,
         seconds=time.perf_counter() - start,
     )
 
 
 @dataclass(frozen=True, eq=False)
-class CompositeLattice:
-    """A lattice of a composite.
+class MediumLattice:
+    """A lattice of a medium.
 
     Parameters
     ----------
     lattice : Lattice
     owner : ndarray of int64, shape (n,)
-        Row number of the inclusion that a node belongs to, `etc_engine.medium.composite.MATRIX` for none.
+        Row number of the inclusion that a node belongs to, `etc_engine.medium.phases.PORE` for none.
     """
 
     lattice: Lattice
@@ -157,22 +161,22 @@ class CompositeLattice:
     def volume_fraction(self) -> float:
         """Volume fraction of the inclusions' nodes."""
         volumes = self.lattice.volumes
-        return float(volumes[self.owner != MATRIX].sum() / volumes.sum())
+        return float(volumes[self.owner != PORE].sum() / volumes.sum())
 
 
-def composite_lattice(
-    composite: Composite,
+def medium_lattice(
+    medium: Medium,
     particles: int,
     rng: np.random.Generator,
     *,
     boundary: str = "periodic",
     transmission: str = "laguerre",
-) -> CompositeLattice:
-    """Lattice for a composite, as `homogenize_lattice` uses it; arguments are the same.
+) -> MediumLattice:
+    """Lattice for a medium, as `homogenize_lattice` uses it; arguments are the same.
 
     Returns
     -------
-    CompositeLattice
+    MediumLattice
         With C_t = 1 where the transmission is ``contact``.
 
     Raises
@@ -180,17 +184,17 @@ def composite_lattice(
     GeometryError
         If an inclusion holds no particle.
     """
-    lengths = composite.inclusions.box.lengths
+    lengths = medium.packing.box.lengths
     box = Box(lengths, (boundary == "periodic",) * 3)
     if transmission == "laguerre":
-        seeds = fitted_seeds(composite, particles, rng, box)
-        return CompositeLattice(laguerre_lattice(seeds.packing), seeds.owner)
+        seeds = fitted_seeds(medium.packing, particles, rng, box)
+        return MediumLattice(laguerre_lattice(seeds.packing), seeds.owner)
     packing = dense_packing(particles, box, rng)
-    owner = composite.phase(packing.centers)
-    missing = np.setdiff1d(np.arange(composite.inclusions.count), owner)
+    owner = find_owners(medium.packing, packing.centers)
+    missing = np.setdiff1d(np.arange(medium.packing.count), owner)
     if missing.size:
         raise GeometryError(f"inclusion {missing[0]} holds no lattice particle: use more than {particles} particles")
-    return CompositeLattice(contact_lattice(packing, COORDINATION), owner)
+    return MediumLattice(contact_lattice(packing, COORDINATION), owner)
 
 
 def dense_packing(count: int, box: Box, rng: np.random.Generator) -> ParticlePacking:
@@ -206,25 +210,25 @@ def dense_packing(count: int, box: Box, rng: np.random.Generator) -> ParticlePac
         return pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.98 * refusal.reached)
 
 
-def node_conductivities(composite: Composite, owner: NDArray[np.int64]) -> NDArray[np.float64]:
+def node_conductivities(medium: Medium, owner: NDArray[np.int64]) -> NDArray[np.float64]:
     """Conductivity at each node, a large number where it is infinite, shape (n,) [W/(m K)]."""
-    k = np.append(composite.inclusion, composite.matrix)
+    k = of_owners(medium, np.arange(PORE, medium.packing.count))
     finite = np.isfinite(k)
     largest = float(k[finite].max(initial=0.0))
-    return np.asarray(np.where(finite, k, SUPERCONDUCTOR * largest)[owner])
+    return np.asarray(np.where(finite, k, SUPERCONDUCTOR * largest)[owner - PORE])
 
 
 @dataclass(frozen=True, eq=False)
 class _Conducted:
     """One lattice and its conductivity."""
 
-    result: LatticeConductivity
+    result: EffectiveConductivity[LinkSolution]
     volume_fraction: float
     nodes: int
 
 
 def _conduct(
-    composite: Composite,
+    medium: Medium,
     rng: np.random.Generator,
     particles: int,
     boundary: str,
@@ -232,21 +236,21 @@ def _conduct(
     interface_resistance: float,
     tolerance: float,
 ) -> _Conducted:
-    made = composite_lattice(composite, particles, rng, boundary=boundary, transmission=transmission)
-    _refuse_joined(composite, made, interface_resistance)
-    k = node_conductivities(composite, made.owner)
+    made = medium_lattice(medium, particles, rng, boundary=boundary, transmission=transmission)
+    _refuse_joined(medium, made, interface_resistance)
+    k = node_conductivities(medium, made.owner)
     conductances = link_conductances(made.lattice, k, interface_resistance=interface_resistance, phase=made.owner)
     result = conductivity_tensor(made.lattice, conductances, tolerance=tolerance)
     if transmission == "contact":
         bare = conductivity_tensor(made.lattice, link_conductances(made.lattice), tolerance=tolerance)
         scale = np.sqrt(np.diag(bare.tensor))
-        result = LatticeConductivity(result.tensor / np.outer(scale, scale), result.fields)
+        result = replace(result, tensor=result.tensor / np.outer(scale, scale))
     return _Conducted(result, made.volume_fraction, made.lattice.count)
 
 
-def _refuse_joined(composite: Composite, made: CompositeLattice, interface_resistance: float) -> None:
+def _refuse_joined(medium: Medium, made: MediumLattice, interface_resistance: float) -> None:
     """Refuse perfect conductors whose particles are linked all the way across the cell."""
-    perfect = np.append(np.isinf(composite.inclusion), False)[made.owner]
+    perfect = np.append(np.isinf(medium.conductivity), False)[made.owner]
     if not perfect.any():
         return
     lattice = made.lattice
@@ -254,14 +258,13 @@ def _refuse_joined(composite: Composite, made: CompositeLattice, interface_resis
     linked = perfect[i] & perfect[j] & (lattice.sections > 0.0)
     if interface_resistance > 0.0:
         linked &= made.owner[i] == made.owner[j]
-    ends = perfect[lattice.wall_nodes]
+    ends = perfect[lattice.wall_particles]
     joined = joined_axes(
-        lattice.count,
+        lattice.packing,
         lattice.pairs[linked],
         lattice.shifts[linked],
-        lattice.wall_nodes[ends],
+        lattice.wall_particles[ends],
         lattice.walls[ends],
-        lattice.packing.box,
     )
     if joined:
         raise GeometryError(
@@ -271,10 +274,10 @@ def _refuse_joined(composite: Composite, made: CompositeLattice, interface_resis
         )
 
 
-def _refuse(composite: Composite, particles: int, boundary: str, transmission: str) -> None:
-    if composite.dimension != 3:
+def _refuse(medium: Medium, particles: int, boundary: str, transmission: str) -> None:
+    if medium.dimension != 3:
         raise InputError(
-            f"the particle lattice is three-dimensional, found inclusions in {composite.dimension} dimensions: "
+            f"the particle lattice is three-dimensional, found particles in {medium.dimension} dimensions: "
             "use the engine voxel"
         )
     if not isinstance(particles, (int, np.integer)) or particles < FEWEST:
@@ -283,5 +286,23 @@ def _refuse(composite: Composite, particles: int, boundary: str, transmission: s
         raise InputError(f"unknown boundary {boundary!r}: expected one of {', '.join(BOUNDARIES)}")
     if transmission not in TRANSMISSIONS:
         raise InputError(f"unknown transmission {transmission!r}: expected one of {', '.join(TRANSMISSIONS)}")
-    if composite.matrix == 0.0 and np.isinf(composite.inclusion).all():
+    check_phases(medium)
+    if medium.pores.conductivity == 0.0 and np.isinf(medium.conductivity).all():
         raise InputError("perfect conductors in an insulating matrix have no finite conductivity: change one of them")
+
+
+def solve_series(media: Sequence[Medium], conduction: Conduction, seed: int) -> list[Result]:
+    """Effective conductivity of media, one result per medium; all lattices start from the same seed."""
+
+    def alone(medium: Medium) -> Result:
+        return attempt(
+            lambda: homogenize_lattice(
+                medium,
+                rng=np.random.default_rng(seed),
+                transmission=conduction.method,
+                tolerance=conduction.tolerance,
+                **conduction.options,
+            )
+        )
+
+    return [alone(medium) for medium in media]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.rules import coordination_contacts
+from etc_engine.medium.rules import closest_neighbors
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.laguerre import laguerre_facets
 
@@ -46,7 +46,7 @@ class Lattice:
         Where the heat crosses: centroid of the transmission surface, as seen from i.
     volumes : ndarray, shape (n,) [m3]
         Volume of the body that a node stands for; they add up to that of the body.
-    wall_nodes, walls : ndarray of int64, shape (w,)
+    wall_particles, walls : ndarray of int64, shape (w,)
         Node and wall of each wall link; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end of the box.
     wall_sections, wall_segments : ndarray, shape (w,)
         Surface [m2] and length [m] of each wall link.
@@ -61,7 +61,7 @@ class Lattice:
     segments: NDArray[np.float64]
     crossings: NDArray[np.float64]
     volumes: NDArray[np.float64]
-    wall_nodes: NDArray[np.int64]
+    wall_particles: NDArray[np.int64]
     walls: NDArray[np.int64]
     wall_sections: NDArray[np.float64]
     wall_segments: NDArray[np.float64]
@@ -210,7 +210,7 @@ def contact_lattice(
         raise InputError(f"the transmission coefficient C_t must be positive and finite, found {transmission:g}")
     if attachment not in ATTACHMENTS:
         raise InputError(f"unknown attachment {attachment!r}: expected one of {', '.join(ATTACHMENTS)}")
-    network = coordination_contacts(packing, 0.1, coordination)  # any half-angle: only who touches whom is used
+    network = closest_neighbors(packing, coordination)
     radii = packing.radii
     pairs, walls, nodes = network.pairs, network.walls, network.wall_particles
     branches = _branches(packing, pairs, network.shifts)
@@ -292,7 +292,7 @@ def link_conductances(
     k = np.broadcast_to(k, (lattice.count,))
     with np.errstate(divide="ignore"):
         resistance = (lattice.segments / k[lattice.pairs]).sum(axis=1)
-        wall_resistance = lattice.wall_segments / k[lattice.wall_nodes]
+        wall_resistance = lattice.wall_segments / k[lattice.wall_particles]
     if interface_resistance > 0.0:
         if phase is None:
             raise InputError("an interface resistance needs the phase of each node")

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.composite import MATRIX, Composite
+from etc_engine.medium.phases import PORE, find_owners
 from etc_engine.packing.particles import ParticlePacking
 
-Geometry = Composite | ParticlePacking | NDArray[np.integer] | Callable[[NDArray[np.float64]], ArrayLike]
+Geometry = ParticlePacking | NDArray[np.integer] | Callable[[NDArray[np.float64]], ArrayLike]
 """Spheres in a matrix, an array of voxels that fills the box, or a function of points of shape (m, 3)."""
 
 
@@ -24,8 +24,8 @@ def find_phases(points: ArrayLike, box: Box, geometry: Geometry) -> NDArray[np.i
     points : array_like, shape (m, 3) [m]
         Inside the box.
     box : Box
-    geometry : Composite, ParticlePacking, ndarray of int or callable
-        A composite or a packing of spheres gives 0 in the matrix and 1 in the spheres; an array, shape (nx, ny, nz),
+    geometry : ParticlePacking, ndarray of int or callable
+        A packing of spheres gives 0 in the pores and 1 in the spheres; an array, shape (nx, ny, nz),
         the value of the voxel that holds the point; a function is called with the points.
 
     Returns
@@ -35,7 +35,7 @@ def find_phases(points: ArrayLike, box: Box, geometry: Geometry) -> NDArray[np.i
     Raises
     ------
     InputError
-        If an array has no three axes or is not of integers, or a function's answer does not fit.
+        If an array has no three axes or is not of integers, or what a function returns does not fit.
 
     Examples
     --------
@@ -45,14 +45,12 @@ def find_phases(points: ArrayLike, box: Box, geometry: Geometry) -> NDArray[np.i
     """
     points = np.asarray(points, dtype=np.float64)
     if isinstance(geometry, ParticlePacking):
-        geometry = Composite(geometry, 1.0, np.asarray(1.0))
-    if isinstance(geometry, Composite):
-        return np.asarray(geometry.phase(points) != MATRIX).astype(np.int64)
+        return np.asarray(find_owners(geometry, points) != PORE).astype(np.int64)
     if callable(geometry):
         found = np.asarray(geometry(points))
         if found.shape != (len(points),) or not _whole(found):
             raise InputError(
-                f"the geometry must answer one whole phase number for each of {len(points)} points, found shape "
+                f"the geometry must return one whole phase number for each of {len(points)} points, found shape "
                 f"{found.shape} of {found.dtype}"
             )
         return found.astype(np.int64)

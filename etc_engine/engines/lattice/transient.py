@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.engines.lattice.body import SURFACE
 from etc_engine.engines.lattice.network import Conductances, Lattice
-from etc_engine.engines.lattice.steady import laplacian
 from etc_engine.errors import InputError
+from etc_engine.medium.links import laplacian
 from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, WallCondition
 from etc_engine.solvers.marching import HeatSystem
 
@@ -82,7 +82,7 @@ def heat_system(
             film = condition.coefficient * _areas(lattice, wall)
             tied[rows] = tied[rows] * film / (tied[rows] + film)
         held[rows] = isinstance(condition, FixedTemperature | Convective)
-    matrix = laplacian(lattice, Conductances(conductances.links, tied), held)
+    matrix = laplacian(n, lattice.pairs, conductances.links, lattice.wall_particles[held], tied[held])
 
     def wall_flow(t: float, wall: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Heat flow into each linked node: the part that is given, and what a kelvin of the node takes off it."""
@@ -96,14 +96,14 @@ def heat_system(
     def load(t: float) -> NDArray[np.float64]:
         total = heat.copy()
         for wall in walls:
-            total += np.bincount(lattice.wall_nodes[links[wall]], wall_flow(t, wall)[0], minlength=n)
+            total += np.bincount(lattice.wall_particles[links[wall]], wall_flow(t, wall)[0], minlength=n)
         return total
 
     def heat_rates(t: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
         flows = []
         for wall in walls:
             given, taken = wall_flow(t, wall)
-            flows.append(float((given - taken * temperatures[lattice.wall_nodes[links[wall]]]).sum()))
+            flows.append(float((given - taken * temperatures[lattice.wall_particles[links[wall]]]).sum()))
         return np.array([*flows, float(heat.sum())])
 
     return HeatSystem(lattice.volumes * capacity, matrix, load, heat_rates)

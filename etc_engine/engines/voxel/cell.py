@@ -27,6 +27,34 @@ SINGULAR = 1e-11
 """Part of the largest resistivity below which perfect conductors are said to join across the cell."""
 
 
+@dataclass(frozen=True)
+class Scheme:
+    """How a cell is solved.
+
+    Parameters
+    ----------
+    solver : str
+        ``cg`` or ``eyre-milton``.
+    green : str
+        ``rotated`` or ``continuous``, see `etc_engine.engines.voxel.green.gradient_projection`.
+    tolerance : float
+        Relative error of the conductivity left by the solver.
+    threads : int
+        Threads of the FFT; the result does not depend on them.
+    limit : int
+        Most iterations of a load.
+    """
+
+    solver: str = "cg"
+    green: str = "rotated"
+    tolerance: float = 1e-8
+    threads: int = 1
+    limit: int = 5000
+
+
+DEFAULT_SCHEME = Scheme()
+
+
 @dataclass(frozen=True, eq=False)
 class CellSolution:
     """Effective conductivity of an image.
@@ -54,11 +82,7 @@ def solve_cell(
     lengths: Sequence[float],
     *,
     boundary: str = "periodic",
-    solver: str = "cg",
-    green: str = "rotated",
-    tolerance: float = 1e-8,
-    threads: int = 1,
-    limit: int = 5000,
+    scheme: Scheme = DEFAULT_SCHEME,
     axes: tuple[int, ...] | None = None,
     keep_gradients: bool = False,
 ) -> CellSolution:
@@ -76,20 +100,11 @@ def solve_cell(
     boundary : str
         ``periodic``; or ``walls``: along each axis between two isothermal faces, the others adiabatic. That is the
         periodic cell of the image and its mirror images, solved by sines and cosines at the size of the image.
-    solver : str
-        ``cg`` or ``eyre-milton``.
-    green : str
-        ``rotated`` or ``continuous``, see `etc_engine.engines.voxel.green.gradient_projection`.
-    tolerance : float
-        Relative error of the conductivity left by the solver.
-    threads : int
-        Threads of the FFT; the result does not depend on them.
-    limit : int
-        Most iterations of a load.
+    scheme : Scheme
     axes : tuple of int, optional
         Load axes wanted, all by default; components between others are NaN.
     keep_gradients : bool
-        Whether the gradient fields are answered too.
+        Whether the gradient fields are returned too.
 
     Returns
     -------
@@ -105,7 +120,7 @@ def solve_cell(
     other side. `tolerance` bounds the change of the polarization with Eyre-Milton, to which the error of the
     conductivity is proportional; conjugate gradients estimate that error itself, which is the square of the
     residual's, and need about half the iterations for it. Where voxels insulate, what is below 1e-8 of the largest
-    conductivity is rounding, and answered as 0 with no error.
+    conductivity is rounding, and returned as 0 with no error.
 
     Examples
     --------
@@ -116,8 +131,8 @@ def solve_cell(
     """
     image = voxel_conductivity(conductivity)
     d = len(image.shape)
-    _check_numbers(d, lengths, tolerance, threads, limit, axes)
-    _check(image, boundary, solver)
+    _check_numbers(d, lengths, scheme, axes)
+    _check(image, boundary, scheme.solver)
     spacing = tuple(length / count for length, count in zip(lengths, image.shape, strict=True))
     perfect = bool(np.isinf(image.extremes()[1]))
     wanted = tuple(range(d)) if axes is None else axes
@@ -125,15 +140,13 @@ def solve_cell(
     for group in (wanted,) if boundary == "periodic" else tuple((axis,) for axis in wanted):
         projection: GradientProjection | WallProjection
         if boundary == "periodic":
-            projection = gradient_projection(image.shape, spacing, green, threads)
+            projection = gradient_projection(image.shape, spacing, scheme.green, scheme.threads)
         else:
-            projection = wall_projection(image.shape, spacing, group[0], green, threads)
+            projection = wall_projection(image.shape, spacing, group[0], scheme.green, scheme.threads)
         if perfect:
-            part, found = _solve_fluxes(image, projection, group, tolerance, limit)
+            part, found = _solve_fluxes(image, projection, group, scheme)
         else:
-            part, found = _solve_loads(
-                image, projection.onto_gradients, group, solver, tolerance, limit, keep_gradients
-            )
+            part, found = _solve_loads(image, projection.onto_gradients, group, scheme, keep_gradients)
             _cut_off(part, found, group, image)
         known = np.ix_(group, group)
         tensor[known] = part[known]
@@ -146,9 +159,8 @@ def solve_cell(
     return CellSolution(tensor, max(load.iterations for load in loads), max(load.error for load in loads), kept)
 
 
-def _check_numbers(
-    d: int, lengths: Sequence[float], tolerance: float, threads: int, limit: int, axes: tuple[int, ...] | None
-) -> None:
+def _check_numbers(d: int, lengths: Sequence[float], scheme: Scheme, axes: tuple[int, ...] | None) -> None:
+    tolerance, threads, limit = scheme.tolerance, scheme.threads, scheme.limit
     numbers = all(isinstance(x, (int, float, np.number)) and np.isfinite(float(x)) and x > 0.0 for x in lengths)
     if len(lengths) != d or not numbers:
         raise InputError(f"an image of {d} axes needs as many positive edge lengths, found {tuple(lengths)}")
@@ -194,19 +206,17 @@ def _solve_loads(
     conductivity: VoxelConductivity,
     project: Projection,
     axes: tuple[int, ...],
-    solver: str,
-    tolerance: float,
-    limit: int,
+    scheme: Scheme,
     keep: bool = False,
 ) -> tuple[NDArray[np.float64], list[LoadSolution]]:
     """A load along each axis. The energy of two loads is the flux of one and its imbalance in the other's gradient."""
     d = len(conductivity.shape)
-    solve = solve_conjugate_gradients if solver == "cg" else solve_eyre_milton
+    solve = solve_conjugate_gradients if scheme.solver == "cg" else solve_eyre_milton
     tensor = np.full((d, d), np.nan)
     loads: list[LoadSolution] = []
     single: dict[int, NDArray[np.float32]] = {}  # enough for a correction of second order
     for axis in axes:
-        load = solve(conductivity, project, np.eye(d)[axis], tolerance, limit)
+        load = solve(conductivity, project, np.eye(d)[axis], scheme.tolerance, scheme.limit)
         tensor[axis, axis] = load.flux[axis]
         for earlier in axes[: len(loads)]:
             component = load.flux[earlier]
@@ -240,8 +250,7 @@ def _solve_fluxes(
     image: VoxelConductivity,
     projection: GradientProjection | WallProjection,
     axes: tuple[int, ...],
-    tolerance: float,
-    limit: int,
+    scheme: Scheme,
 ) -> tuple[NDArray[np.float64], list[LoadSolution]]:
     """Mean fluxes along each axis through the resistivities, which vanish in perfect conductors."""
     d = len(image.shape)
@@ -249,7 +258,7 @@ def _solve_fluxes(
         resistivity = image.of(np.reciprocal)
     if isinstance(projection, GradientProjection):
         axes = tuple(range(d))  # the inverse takes them all
-    found, loads = _solve_loads(resistivity, projection.onto_fluxes, axes, "cg", tolerance, limit)
+    found, loads = _solve_loads(resistivity, projection.onto_fluxes, axes, replace(scheme, solver="cg"))
     known = np.ix_(axes, axes)
     if np.linalg.eigvalsh(found[known])[0] <= SINGULAR * float(np.diag(resistivity.mean()).max()):
         along = AXES[axes[int(np.argmin(np.diag(found[known])))]]

@@ -1,17 +1,19 @@
-"""A section through a composite and the heat flux in it, for pictures and points."""
+"""A section through a medium and the heat flux in it, for pictures and points."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
-from etc_engine.engines.voxel.cell import solve_cell
+from etc_engine.engines.voxel.cell import DEFAULT_SCHEME, Scheme, solve_cell
 from etc_engine.engines.voxel.voxelization import check_resolution, voxelize
 from etc_engine.errors import InputError
-from etc_engine.medium.composite import Composite
+from etc_engine.medium.medium import Medium
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +39,18 @@ class Section:
 
 
 def solve_section(
-    composite: Composite,
+    medium: Medium,
     *,
     resolution: int = 64,
     boundary: str = "periodic",
-    solver: str = "cg",
-    green: str = "rotated",
     voxels: str = "laminate",
-    threads: int = 1,
+    scheme: Scheme = DEFAULT_SCHEME,
 ) -> Section:
-    """Heat flux in a section of a composite, of spheres where the inclusions fill the largest area.
+    """Heat flux in a section of a medium, of spheres where the inclusions fill the largest area.
 
     Parameters
     ----------
-    composite, resolution, boundary, solver, green, voxels, threads
+    medium, resolution, boundary, voxels, scheme
         As in `etc_engine.engines.voxel.homogenize.homogenize_voxel`.
 
     Returns
@@ -65,32 +65,32 @@ def solve_section(
     Examples
     --------
     >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.medium import Pores
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.5, 0.5]], [0.3], Box((1.0, 1.0), (True, True)))
-    >>> solve_section(Composite(disk, 1.0, 1.0), resolution=16).flux.max().round(12)
+    >>> solve_section(Medium(disk, 1.0, pores=Pores(1.0)), resolution=16).flux.max().round(12)
     np.float64(1.0)
     """
-    check_resolution(composite, resolution)
-    if np.isinf(composite.inclusion).any():
+    check_resolution(medium, resolution)
+    if np.isinf(medium.conductivity).any():
         raise InputError("a picture of the flux needs finite conductivities: give the inclusions a large one")
-    image = voxelize(composite, resolution, voxels)
-    lengths = composite.inclusions.box.lengths
-    solution = solve_cell(
-        image.conductivity,
-        lengths,
-        boundary=boundary,
-        solver=solver,
-        green=green,
-        threads=threads,
-        keep_gradients=True,
-        axes=(0,),
-    )
+    image = voxelize(medium, resolution, voxels)
+    lengths = medium.packing.box.lengths
+    solution = solve_cell(image.conductivity, lengths, boundary=boundary, scheme=scheme, keep_gradients=True, axes=(0,))
     flux = np.sqrt((image.conductivity.apply(np.ascontiguousarray(solution.gradients[0])) ** 2).sum(axis=0))
-    if composite.dimension == 3:
+    if medium.dimension == 3:
         layer = int(np.argmax(image.fractions.sum(axis=(0, 1)).round(9)))  # of layers alike the first
         height = (layer + 0.5) * lengths[2] / flux.shape[2]
         return Section((lengths[0], lengths[1]), image.fractions[:, :, layer], flux[:, :, layer], height)
     return Section((lengths[0], lengths[1]), image.fractions, flux)
+
+
+def section_of(medium: Medium, method: str, options: Mapping[str, Any]) -> Section:
+    """The section for the options of the engine table; ``method`` is the kind of voxels."""
+    given = dict(options)
+    scheme = Scheme(**{key: given.pop(key) for key in ("solver", "green", "threads") if key in given})
+    boundary = given.pop("boundary", None) or ("periodic" if all(medium.box.periodic) else "walls")
+    return solve_section(medium, boundary=boundary, voxels=method, scheme=scheme, **given)
 
 
 def temperature_between_walls(gradients: NDArray[np.float64], axis: int, length: float) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Voxels of a composite: exact volume fractions, and a laminate in every voxel that an interface crosses."""
+"""Voxels of a medium: exact volume fractions, and a laminate in every voxel that an interface crosses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from etc_engine.engines.voxel.conductivity import VoxelConductivity
 from etc_engine.engines.voxel.fractions import ball_in_box
 from etc_engine.errors import InputError
 from etc_engine.medium.backbone import joined_axes
-from etc_engine.medium.composite import ROUNDING, Composite
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.phases import ROUNDING, check_phases, of_owners
 from etc_engine.packing.neighbors import neighbor_pairs
 
 # the sphere or disk within half-spaces, which the exact union of a packing is made of
@@ -35,7 +36,7 @@ GRAIN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class VoxelImage:
-    """A composite on a regular grid.
+    """A medium on a regular grid.
 
     Parameters
     ----------
@@ -79,11 +80,11 @@ def grid_shape(lengths: tuple[float, ...], resolution: int) -> tuple[int, ...]:
     return tuple(max(round(resolution * length / shortest), resolution) for length in lengths)
 
 
-def smallest_diameter(composite: Composite, resolution: int) -> float:
+def smallest_diameter(medium: Medium, resolution: int) -> float:
     """Diameter of the smallest inclusion in voxels."""
-    box = composite.inclusions.box
+    box = medium.packing.box
     step = max(length / n for length, n in zip(box.lengths, grid_shape(box.lengths, resolution), strict=True))
-    return 2.0 * float(composite.inclusions.radii.min()) / step
+    return 2.0 * float(medium.packing.radii.min()) / step
 
 
 def coarsest_resolution(lengths: tuple[float, ...], radius: float) -> int:
@@ -97,18 +98,18 @@ def coarsest_resolution(lengths: tuple[float, ...], radius: float) -> int:
     return int(np.ceil(FEWEST * min(lengths) / (2.0 * radius) * (1.0 - 1e-12)))
 
 
-def check_resolution(composite: Composite, resolution: int) -> None:
+def check_resolution(medium: Medium, resolution: int) -> None:
     """Refuse a grid with fewer than `FEWEST` voxels across the smallest inclusion, or that does not fit into memory.
 
     Raises
     ------
     InputError
     """
-    check_memory(composite.inclusions.box.lengths, resolution)
-    spanned = smallest_diameter(composite, resolution)
+    check_memory(medium.packing.box.lengths, resolution)
+    spanned = smallest_diameter(medium, resolution)
     if spanned < FEWEST * (1.0 - 1e-12):
-        diameter = 2.0 * float(composite.inclusions.radii.min())
-        needed = coarsest_resolution(composite.inclusions.box.lengths, 0.5 * diameter)
+        diameter = 2.0 * float(medium.packing.radii.min())
+        needed = coarsest_resolution(medium.packing.box.lengths, 0.5 * diameter)
         raise InputError(
             f"resolution {resolution} is too coarse: the smallest inclusion, of diameter {diameter:.6g}, spans "
             f"{spanned:.2g} voxels and {FEWEST} are needed: take a resolution of at least {needed}"
@@ -135,14 +136,14 @@ def check_memory(lengths: tuple[float, ...], resolution: int) -> None:
         )
 
 
-def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate") -> VoxelImage:
-    r"""A composite on a grid of voxels.
+def voxelize(medium: Medium, resolution: int = 64, voxels: str = "laminate") -> VoxelImage:
+    r"""A medium on a grid of voxels.
 
     .. math:: k = \langle k \rangle (I - n n^T) + \langle k^{-1} \rangle^{-1} n n^T
 
     Parameters
     ----------
-    composite : Composite
+    medium : Medium
         Its box is filled; periodic axes repeat the inclusions, walls cut them.
     resolution : int
         Voxels along the shortest edge of the box; the others get as many as make the voxels most nearly cubic.
@@ -163,7 +164,8 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     Notes
     -----
     Fractions are exact: in closed form where one surface crosses a voxel; where the radical plane of two overlapping
-    inclusions does too (that is where `Composite` divides them), by the kernels behind the exact solid fraction. A
+    inclusions does too (that is where `etc_engine.medium.phases.find_owners` divides them), by the kernels behind the
+    exact solid fraction. A
     voxel with pieces f_i of several inclusions is one laminate of all their phases and the matrix, normal to the
     principal axis of :math:`\sum f_i (1 - f_i) n_i n_i^T`: right for the thin layer of matrix between two inclusions.
     A voxel that holds part of an insulator (a perfect conductor) is isotropic with the mean conductivity (mean
@@ -181,9 +183,10 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
     Examples
     --------
     >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.medium import Pores
     >>> from etc_engine.packing.particles import ParticlePacking
     >>> disk = ParticlePacking([[0.0, 0.0]], [0.4], Box((1.0, 1.0), (True, True)))
-    >>> image = voxelize(Composite(disk, 1.0, 5.0), 10)
+    >>> image = voxelize(Medium(disk, 5.0, pores=Pores(1.0)), 10)
     >>> abs(image.volume_fraction - 0.16 * np.pi) < 1e-14
     True
     """
@@ -191,26 +194,27 @@ def voxelize(composite: Composite, resolution: int = 64, voxels: str = "laminate
         raise InputError(f"unknown voxels {voxels!r}: choose {' or '.join(VOXELS)}")
     if resolution < 2:
         raise InputError(f"a grid has at least 2 voxels along an edge, found a resolution of {resolution}")
-    shape = grid_shape(composite.inclusions.box.lengths, resolution)
-    pieces = _find_pieces(composite, shape)
+    check_phases(medium)
+    shape = grid_shape(medium.packing.box.lengths, resolution)
+    pieces = _find_pieces(medium, shape)
     fractions = np.bincount(pieces.voxel, pieces.fraction, pieces.owner.size).astype(np.float64)
     fractions[pieces.owner >= 0] = 1.0
-    scalars = np.append(composite.inclusion, composite.matrix)[pieces.owner]
+    scalars = of_owners(medium, pieces.owner)
     if voxels == "binary":
         central = pieces.central
-        scalars[pieces.voxel[central]] = composite.inclusion[pieces.inclusion[central]]
+        scalars[pieces.voxel[central]] = medium.conductivity[pieces.inclusion[central]]
         share = float((pieces.owner >= 0).sum() + np.unique(pieces.voxel[central]).size) / scalars.size
-        d = composite.dimension
+        d = medium.dimension
         plain = VoxelConductivity(
             scalars.reshape(shape), np.zeros(0, dtype=np.int64), np.zeros((0, d)), np.zeros((0, d, d))
         )
         return VoxelImage(plain, share, fractions.reshape(shape))
-    layered = VoxelConductivity(scalars.reshape(shape), *_laminates(composite, pieces))
+    layered = VoxelConductivity(scalars.reshape(shape), *_laminates(medium, pieces))
     return VoxelImage(layered, float(fractions.mean()), fractions.reshape(shape))
 
 
-def _find_pieces(composite: Composite, shape: tuple[int, ...]) -> _Pieces:
-    inclusions = composite.inclusions
+def _find_pieces(medium: Medium, shape: tuple[int, ...]) -> _Pieces:
+    inclusions = medium.packing
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
     angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
     steps = np.asarray(inclusions.box.lengths) / np.asarray(shape)
@@ -230,19 +234,17 @@ def _find_pieces(composite: Composite, shape: tuple[int, ...]) -> _Pieces:
     return _Pieces(owner, voxel[:count], inclusion[:count], fraction[:count], normal[:count], central[:count])
 
 
-def _laminates(
-    composite: Composite, pieces: _Pieces
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def _laminates(medium: Medium, pieces: _Pieces) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Voxels that an interface crosses: flat numbers, principal conductivities (the normal one first), axes."""
-    d = composite.dimension
+    d = medium.dimension
     rows, of = np.unique(pieces.voxel, return_inverse=True)
-    k = composite.inclusion[pieces.inclusion]
+    k = medium.conductivity[pieces.inclusion]
     filled = np.minimum(np.bincount(of, pieces.fraction, rows.size), 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         parallel = np.bincount(of, pieces.fraction * k, rows.size)
-        parallel += np.where(filled < 1.0, (1.0 - filled) * composite.matrix, 0.0)
+        parallel += np.where(filled < 1.0, (1.0 - filled) * medium.pores.conductivity, 0.0)
         resistance = np.bincount(of, pieces.fraction / k, rows.size)
-        resistance += np.where(filled < 1.0, (1.0 - filled) / composite.matrix, 0.0)
+        resistance += np.where(filled < 1.0, (1.0 - filled) / medium.pores.conductivity, 0.0)
         series = 1.0 / resistance
     weight = pieces.fraction * (1.0 - pieces.fraction) + 1e-12
     axes = np.empty((rows.size, d, d))
@@ -256,27 +258,27 @@ def _laminates(
         weight[~alone, None, None] * pieces.normal[~alone, :, None] * pieces.normal[~alone, None, :],
     )
     axes[~single] = np.linalg.eigh(moments[~single])[1][:, :, ::-1]
-    least = np.full(rows.size, composite.matrix)
+    least = np.full(rows.size, medium.pores.conductivity)
     largest = least.copy()
     np.minimum.at(least, of, k)
     np.maximum.at(largest, of, k)
     principal = np.repeat(parallel[:, None], d, axis=1).astype(np.float64)
     principal[:, 0] = np.where(least > 0.0, np.minimum(series, parallel), parallel)
-    _fade(principal, composite, least, largest, series, parallel.astype(np.float64))
+    _fade(principal, medium, least, largest, series, parallel.astype(np.float64))
     principal[np.isinf(largest)] = series[np.isinf(largest), None]
     return rows, principal, axes
 
 
 def _fade(
     principal: NDArray[np.float64],
-    composite: Composite,
+    medium: Medium,
     least: NDArray[np.float64],
     largest: NDArray[np.float64],
     series: NDArray[np.float64],
     parallel: NDArray[np.float64],
 ) -> None:
     """Bring laminates of large finite contrast to isotropic voxels, in place."""
-    matrix = composite.matrix
+    matrix = medium.pores.conductivity
     if matrix == 0.0:
         return
     ahead, behind = _share_faded(largest / matrix), np.zeros(least.size)
@@ -284,13 +286,11 @@ def _fade(
     behind[finite] = _share_faded(matrix / least[finite])
     better = finite & (ahead > 0.0) & (behind == 0.0)
     worse = finite & (behind > 0.0) & (ahead == 0.0)
-    if better.any() and not _reach_through(composite, composite.inclusion > FADING * matrix):
+    if better.any() and not _reach_through(medium, medium.conductivity > FADING * matrix):
         share = ahead[better, None]
         principal[better] = principal[better] ** (1.0 - share) * series[better, None] ** share
     # spheres that touch leave the matrix between them connected, disks cut it off
-    if worse.any() and not (
-        composite.dimension == 2 and _reach_through(composite, composite.inclusion * FADING < matrix)
-    ):
+    if worse.any() and not (medium.dimension == 2 and _reach_through(medium, medium.conductivity * FADING < matrix)):
         share = behind[worse, None]
         principal[worse] = principal[worse] ** (1.0 - share) * parallel[worse, None] ** share
 
@@ -300,17 +300,15 @@ def _share_faded(contrast: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(1.0 - FADING / np.maximum(contrast, FADING))
 
 
-def _reach_through(composite: Composite, members: NDArray[np.bool_]) -> bool:
+def _reach_through(medium: Medium, members: NDArray[np.bool_]) -> bool:
     """Whether some of the inclusions overlap all the way across the cell, along any axis."""
-    inclusions = composite.inclusions
+    inclusions = medium.packing
     found = neighbor_pairs(inclusions)
     overlap = members[found.pairs].all(axis=1) & (found.gaps < -ROUNDING * inclusions.radii.mean())
     depth = np.stack((inclusions.centers, np.asarray(inclusions.box.lengths) - inclusions.centers), axis=2)
     reaching = (depth <= inclusions.radii[:, None, None]) & members[:, None, None]
     nodes, walls = np.nonzero(reaching.reshape(inclusions.count, -1))
-    return bool(
-        joined_axes(inclusions.count, found.pairs[overlap], found.shifts[overlap], nodes, walls, inclusions.box)
-    )
+    return bool(joined_axes(inclusions, found.pairs[overlap], found.shifts[overlap], nodes, walls))
 
 
 def _frame(normals: NDArray[np.float64]) -> NDArray[np.float64]:

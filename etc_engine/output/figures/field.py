@@ -10,10 +10,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 
-from etc_engine.engines.dtem.field import ParticleField
-from etc_engine.engines.dtem.raster import sample_image
-from etc_engine.engines.dtem.steady import SteadySolution
-from etc_engine.engines.pipe.steady import PipeSolution
+from etc_engine.errors import InputError
+from etc_engine.medium.field import ParticleField
+from etc_engine.output.raster import sample_image
 
 DETAILED = 3_000
 """Above this many particles each is drawn in its mean temperature, and contact flows are left out."""
@@ -21,38 +20,38 @@ WIDEST = 0.3
 """Line width of the largest heat flow, in mean particle diameters."""
 
 
-def save_field(
-    path: Path, solution: SteadySolution | PipeSolution, field: ParticleField, caption: str = "", load: int = 0
-) -> None:
+def save_field(path: Path, field: ParticleField, caption: str = "") -> None:
     """Picture of the particles coloured by their inner temperature, heat flows as line widths.
 
     Parameters
     ----------
     path : path
         Its ending decides the format.
-    solution : SteadySolution or PipeSolution
-        A pipe network is drawn in the mean temperatures of its particles.
     field : ParticleField
-        Recovered from it.
+        Where nothing is known inside the particles, they are drawn in their mean temperatures.
     caption : str
         Line above the picture.
-    load : int
-        Load of the field.
+
+    Raises
+    ------
+    InputError
+        If the particles are no disks.
     """
-    network = solution.network
-    packing = network.packing
+    packing = field.medium.packing
+    if packing.dimension != 2:
+        raise InputError("the picture of a temperature field draws disks, the particles are spheres: leave --plot out")
     width, height = packing.box.lengths
     scale = 6.5 / max(width, height)
     figure = Figure(figsize=(max(width * scale, 2.5) + 1.6, max(height * scale, 1.5) + 0.7), layout="constrained")
     axes = figure.add_subplot()
     known = field.particle_temperatures[np.isfinite(field.particle_temperatures)]
-    if packing.box.periodic[solution.axes[load]]:
+    if packing.box.periodic[field.axis]:
         low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     else:
         low, high = 0.0, 1.0
-    detailed, inside = packing.count <= DETAILED, not isinstance(solution, PipeSolution)
-    if detailed and not isinstance(solution, PipeSolution):
-        image, _ = sample_image(solution, field, 900, load)
+    detailed, inside = packing.count <= DETAILED, field.inside is not None
+    if detailed and inside:
+        image, _ = sample_image(field, 900)
         mapped: ScalarMappable = axes.imshow(
             image, extent=(0, width, 0, height), origin="lower", cmap="inferno", vmin=low, vmax=high, zorder=2
         )
@@ -66,7 +65,7 @@ def save_field(
         mapped = disks
     if detailed:
         diameter = 2.0 * float(packing.radii.mean()) * scale * 72.0  # [pt]
-        _draw_flows(axes, solution, field, min(WIDEST * diameter, 5.0))
+        _draw_flows(axes, field, min(WIDEST * diameter, 5.0))
     axes.set(xlim=(0, width), ylim=(0, height), aspect="equal", xlabel="x [m]", ylabel="y [m]")
     axes.set_title(caption, fontsize=10)
     means = "" if detailed and inside else ", mean of each particle"
@@ -89,9 +88,9 @@ def _draw_disks(axes: Axes, centers: np.ndarray, radii: np.ndarray, **style: obj
     return disks
 
 
-def _draw_flows(axes: Axes, solution: SteadySolution | PipeSolution, field: ParticleField, widest: float) -> None:
+def _draw_flows(axes: Axes, field: ParticleField, widest: float) -> None:
     """Lines from centre to centre (or to the wall), as wide as the heat flow, the largest ``widest`` points."""
-    network = solution.network
+    network = field.medium.links
     centers = network.packing.centers
     start = centers[network.pairs[:, 0]]
     lines = np.stack([start, start + network.branches], axis=1)

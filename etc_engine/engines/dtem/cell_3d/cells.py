@@ -15,6 +15,7 @@ from etc_engine.engines.dtem.cell_3d.shell import radial_moments
 from etc_engine.engines.dtem.cell_3d.sphere_energy import green_table
 from etc_engine.engines.dtem.cell_3d.topology import CellTopology
 from etc_engine.errors import InputError
+from etc_engine.laws.sphere import resistance_matrices
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -56,14 +57,14 @@ class CellMaterials:
     fluid : float [W/(m K)]
     contact_radii : ndarray, shape (facets,) [m]
         0 where the spheres do not touch.
-    contact_conductances : ndarray, shape (facets,) [W/(m2 K)]
-        Conductance per area of each contact disk, infinite for perfect contacts.
+    contact_resistances : ndarray, shape (facets,) [K/W]
+        Of each contact itself: half of it on each side, all of it on the sphere at a wall.
     """
 
     spheres: Floats
     fluid: float
     contact_radii: Floats
-    contact_conductances: Floats
+    contact_resistances: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +167,7 @@ def build_cells(
     counts = np.concatenate((np.ones(len(polygons.vertices), dtype=np.int64), on_edges, on_faces))
     blocks = np.concatenate(([0], np.cumsum(counts)))
 
-    resistive = np.isfinite(materials.contact_conductances) & plan.contacts
-    per_side = np.where(second < 0, 1.0, 2.0)  # half of the resistance on each side, all of it at a wall
-    conductances = np.where(resistive, per_side * np.where(resistive, materials.contact_conductances, 0.0), 0.0)
+    resistances = _contact_matrices(topology, plan, radii, materials)
     points, weights = triangle_rule()
     rule = (np.array([shape_functions(xi, eta) for xi, eta in points]), weights)
     t, p = topology, plan
@@ -184,11 +183,10 @@ def build_cells(
     tables = (radial_moments(fineness.radial_degree), rule, green_table())
     matrices, unknowns, nodes = [], [], np.zeros(len(radii), dtype=np.int64)
     for cell in range(len(radii)):
-        media = (radii[cell], materials.spheres[cell], materials.fluid, conductances)
+        media = (radii[cell], materials.spheres[cell], materials.fluid, resistances[cell])
         matrix, inside, directions = cell_energy(cell, *arguments, media, tables)
         own = _unknowns(cell, topology, blocks)
-        faces = topology.side_faces[topology.side_starts[cell] : topology.side_starts[cell + 1]]
-        left = eliminate(matrix, inside, definite=not plan.contacts[faces].any())
+        left = eliminate(matrix, inside, definite=not len(resistances[cell]))
         matrices.append(left[np.tril_indices(len(left))])
         unknowns.append(own)
         nodes[cell] = len(directions)
@@ -197,6 +195,28 @@ def build_cells(
     corner = np.arange(len(topology.vertices)) - np.repeat(topology.vertex_starts[:-1], np.diff(topology.vertex_starts))
     arms[corner + np.repeat(starts[:-1], np.diff(topology.vertex_starts))] = plan.arms
     return CellSystem(topology, plan, np.concatenate(matrices), starts, np.concatenate(unknowns), arms, blocks, nodes)
+
+
+def _contact_matrices(topology: CellTopology, plan: CellPlan, radii: Floats, materials: CellMaterials) -> list[Floats]:
+    """Temperatures of the contact disks of every sphere by unit flows through them [K/W], contact resistance included.
+
+    Exact for equilibrium disks, with the dents of other contacts, as method `chord` of spheres in vacuum.
+    """
+    faces, ends = topology.side_faces, topology.side_ends
+    sides = np.flatnonzero(plan.contacts[faces])
+    cell = np.repeat(np.arange(len(radii)), np.diff(topology.side_starts))[sides]
+    arms = plan.axes[faces[sides], 0] * np.where(ends[sides] == 0, 1.0, -1.0)[:, None]
+    alpha = np.arcsin(np.minimum(materials.contact_radii[faces[sides]] / radii[cell], 1.0))
+    offsets = np.searchsorted(cell, np.arange(len(radii) + 1)).astype(np.int64)
+    packed = resistance_matrices(offsets, arms, alpha, "chord")
+    at_wall = topology.polygons.cells[faces[sides], 1] < 0
+    bond = materials.contact_resistances[faces[sides]] * np.where(at_wall, 1.0, 0.5)
+    matrices, start = [], 0
+    for p, count in enumerate(np.diff(offsets)):
+        own = packed[start : start + count**2].reshape(count, count) / (materials.spheres[p] * radii[p])
+        matrices.append(own + np.diag(bond[offsets[p] : offsets[p + 1]]))
+        start += count**2
+    return matrices
 
 
 def _check_materials(materials: CellMaterials) -> None:

@@ -10,6 +10,8 @@ from scipy.linalg.blas import dtrsm
 
 from etc_engine.engines.dtem.cell_3d.side import side_energy
 from etc_engine.engines.dtem.cell_3d.sphere_energy import green_matrix, sandwich
+from etc_engine.laws.sphere import FOUR_PI
+from etc_engine.laws.sphere_field import disk_temperature
 
 
 @njit(cache=True)
@@ -28,14 +30,13 @@ def boundary_places(corner_vertices, corner_edges, forward, pieces, edge_places)
 
 @njit(cache=True)
 def cell_sizes(cell, topology, mesh, frame):  # type: ignore[no-untyped-def]
-    """Nodes before each edge and side, unknowns of the frame before each, and the places left for jumps."""
+    """Numbers of edge nodes, nodes and unknowns of the frame of a cell, and where each edge and side begins."""
     side_starts, side_faces, starts, edge_of_corner, vertex_starts, edge_starts, edges = topology
-    pieces, level_starts, levels, jumping_faces = mesh
+    pieces, level_starts = mesh
     edge_bubbles, face_bubbles = frame
-    vertices = vertex_starts[cell + 1] - vertex_starts[cell]
+    node = column = vertex_starts[cell + 1] - vertex_starts[cell]
     own = edges[edge_starts[cell] : edge_starts[cell + 1]]
     edge_places, edge_columns = np.empty(len(own), dtype=np.int64), np.empty(len(own), dtype=np.int64)
-    node, column = vertices, vertices
     for e in range(len(own)):
         edge_places[e], edge_columns[e] = node, column
         node += 2 * pieces[own[e]] - 1
@@ -43,88 +44,73 @@ def cell_sizes(cell, topology, mesh, frame):  # type: ignore[no-untyped-def]
     outer = node
     sides = side_starts[cell + 1] - side_starts[cell]
     side_places, side_columns = np.empty(sides, dtype=np.int64), np.empty(sides, dtype=np.int64)
-    jump_places = np.empty(sides, dtype=np.int64)
-    jumps = 0
     for s in range(sides):
         face = side_faces[side_starts[cell] + s]
-        side_places[s], side_columns[s], jump_places[s] = node, column, jumps
+        side_places[s], side_columns[s] = node, column
         around = 0
         for c in range(starts[face], starts[face + 1]):
             around += pieces[edge_of_corner[c]]
-        rings = level_starts[face + 1] - level_starts[face]
-        node += 1 + around * (4 * rings - 3)
+        node += 1 + around * (4 * (level_starts[face + 1] - level_starts[face]) - 3)
         column += face_bubbles[face]
-        if jumping_faces[face]:
-            inside = 0
-            for r in range(rings):
-                if levels[level_starts[face] + r] <= 1.0:
-                    inside += 1
-            jumps += 1 + around * (4 * inside - 3)
-    return outer, node, column, jumps, (edge_places, edge_columns, side_places, side_columns, jump_places)
+    return outer, node, column, (edge_places, edge_columns, side_places, side_columns)
 
 
 @njit(cache=True)
 def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: ignore[no-untyped-def]  # noqa: PLR0915
-    """Energy of one cell over bubbles of edge nodes, jumps, rim temperatures and frame, and where the frame begins.
+    """Energy of one cell over bubbles of edge nodes, rim, contact flows and frame; where the frame begins; rim nodes.
 
-    The sphere adds k R S G S over the rim; every side of a facet adds its shell.
+    Every side of a facet adds its shell, the sphere k R S G S over the rim (`add_sphere`).
     """
     side_starts, side_faces, side_ends, starts, edge_of_corner, vertex_starts, edge_starts, edges = topology[:8]
     corner_vertices, corner_edges, forward = topology[8:]
     corners, axes, heights, disks = geometry
     pieces, centers, level_starts, levels, circles, contacts = mesh
     edge_bubbles, face_bubbles, powers = frame
-    radius, sphere, fluid, conductances = media
+    radius, sphere, fluid, resistances = media
     moments, rule, green = tables
     bubbles = moments.shape[1] - 2
-    outer, nodes, columns, jumps, places = cell_sizes(
+    outer, nodes, columns, places = cell_sizes(
         cell,
         (side_starts, side_faces, starts, edge_of_corner, vertex_starts, edge_starts, edges),
-        (pieces, level_starts, levels, (conductances > 0.0) & contacts),
+        (pieces, level_starts),
         (edge_bubbles, face_bubbles),
     )
-    edge_places, edge_columns, side_places, side_columns, jump_places = places
-    first_rim = bubbles * outer + jumps
-    first = first_rim + nodes
+    edge_places, edge_columns, side_places, side_columns = places
+    flows, first_rim = len(resistances), bubbles * outer
+    first_flow = first_rim + nodes
+    first = first_flow + flows
     matrix = np.zeros((first + columns, first + columns))
-    directions = np.zeros((nodes, 3))
+    directions, angles = np.zeros((nodes, 3)), np.zeros(nodes)
+    normals, sines = np.zeros((flows, 3)), np.zeros(flows)
     room = 16 * nodes + 4096
     rows, cols, values = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64), np.empty(room)
-    entries = 0
-    dead = np.empty(nodes, dtype=np.int64)
-    dead_basis = np.zeros((nodes, columns))
-    dead_count = 0
+    entries, flow = 0, 0
     for s in range(len(side_places)):
         face, end = side_faces[side_starts[cell] + s], side_ends[side_starts[cell] + s]
         span = slice(starts[face], starts[face + 1])
         own_edges = edge_of_corner[span]
         count = face_bubbles[face]
-        local, rim, points, inner, on_edge, edge_basis, own_jumps = side_energy(
+        local, rim, own_angles, points, inner, mean = side_energy(
             corners[span],
             (pieces[own_edges], forward[span], edge_bubbles[own_edges]),
             powers[:count],
             (centers[face], levels[level_starts[face] : level_starts[face + 1]], circles[face], contacts[face]),
-            (heights[face, end], disks[face, end], (radius, fluid, sphere), conductances[face]),
+            (heights[face, end], disks[face, end], radius, fluid),
             (moments, rule),
         )
         n = len(points)
         edge_nodes = boundary_places(
             corner_vertices[end, span], corner_edges[end, span], forward[span], pieces[own_edges], edge_places
         )
-        node = np.empty(n, dtype=np.int64)
-        for a in range(n):
-            node[a] = side_places[s] + a if a < inner else edge_nodes[a - inner]
         where = np.empty(len(local), dtype=np.int64)
         at = 0
         for p in range(bubbles):
             for a in range(n - inner):
                 where[at] = p * outer + edge_nodes[a]
                 at += 1
-        for j in range(own_jumps):
-            where[at] = bubbles * outer + jump_places[s] + j
-            at += 1
+        first_own = at
         for a in range(n):
-            where[at] = first_rim + node[a]
+            where[at] = first_rim + (side_places[s] + a if a < inner else edge_nodes[a - inner])
             at += 1
         frame_start = at
         for k in range(len(own_edges)):
@@ -142,8 +128,10 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
                 matrix[where[a], where[b]] += local[a, b]
         sign = 1.0 if end == 0 else -1.0
         for a in range(n):
+            node = where[first_own + a] - first_rim
+            angles[node] += own_angles[a]
             for axis in range(3):
-                directions[node[a], axis] = (
+                directions[node, axis] = (
                     sign * points[a, 0] * axes[face, 0, axis]
                     + points[a, 1] * axes[face, 1, axis]
                     + points[a, 2] * axes[face, 2, axis]
@@ -156,37 +144,68 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
         for a in range(n):
             for b in range(n):
                 if rim[a, b] != 0.0:
-                    rows[entries], cols[entries], values[entries] = node[a], node[b], rim[a, b]
+                    rows[entries] = where[first_own + a] - first_rim
+                    cols[entries] = where[first_own + b] - first_rim
+                    values[entries] = rim[a, b]
                     entries += 1
-        for e in range(len(on_edge)):
-            dead[dead_count] = node[on_edge[e]]
-            for c in range(edge_basis.shape[1]):
-                dead_basis[dead_count, where[frame_start + c] - first] = edge_basis[e, c]
-            dead_count += 1
+        if contacts[face]:
+            sines[flow] = disks[face, end, 1] / radius
+            for axis in range(3):
+                normals[flow, axis] = sign * axes[face, 0, axis]
+            for c in range(len(mean)):
+                matrix[first_flow + flow, where[frame_start + c]] += mean[c]
+                matrix[where[frame_start + c], first_flow + flow] += mean[c]
+            flow += 1
     ball = sandwich(green_matrix(directions, green), rows[:entries], cols[:entries], values[:entries])
-    _add_ball(matrix, sphere * radius * ball, dead[:dead_count], dead_basis[:dead_count], first_rim)
+    add_sphere(
+        matrix, (first_rim, first_flow), sphere * radius, (ball, directions, angles), (normals, sines, resistances)
+    )
     return matrix, first, directions
 
 
 @njit(cache=True)
-def _add_ball(matrix, ball, dead, dead_basis, first_rim):  # type: ignore[no-untyped-def]
-    """Add the sphere's energy; on the edge of a contact disk the rim has the temperature of the facet."""
-    nodes = len(ball)
-    first = first_rim + nodes
-    free = np.ones(nodes)
-    free[dead] = 0.0
-    if len(dead) > 0:
-        to_frame = np.dot(np.ascontiguousarray(ball[:, dead]), dead_basis)
-        both = np.dot(dead_basis.T, np.ascontiguousarray(to_frame[dead]))
-        matrix[first:, first:] += both
-        for a in range(nodes):
-            for c in range(len(both)):
-                value = free[a] * to_frame[a, c]
-                matrix[first_rim + a, first + c] += value
-                matrix[first + c, first_rim + a] += value
+def add_sphere(matrix, places, strength, rim, contacts):  # type: ignore[no-untyped-def]
+    r"""Add the sphere: temperature u from the rim and N_c Q_c from the flows Q_c through contact disks.
+
+    N_c is the potential of a disk that sends out its flow as an isothermal disk does, and takes it in uniformly over
+    the surface; `resistances` are the temperatures of disk c by unit flows, contact resistance included. With the rim
+    at z = u + N Q the stationary value over u and Q of
+
+        (1/2) k R u.S G S u - mean(u) sum Q - (1/2) Q.H Q + tau.Q + shell(z)
+
+    is half of the energy; tau are the temperatures of the contact disks. In vacuum u is uniform, and this is the
+    network of contact resistances of the sphere.
+    """
+    first_rim, first_flow = places
+    ball, directions, angles = rim
+    normals, sines, resistances = contacts
+    nodes, flows = len(ball), len(resistances)
+    first = first_flow + flows
+    total = angles.sum()
+    if flows > 0:
+        potential = np.empty((nodes, flows))
+        for c in range(flows):
+            a = np.arcsin(min(sines[c], 1.0))
+            for i in range(nodes):
+                cosine = 0.0
+                for axis in range(3):
+                    cosine += directions[i, axis] * normals[c, axis]
+                potential[i, c] = disk_temperature(1.0, cosine, a) / (FOUR_PI * strength)
+        carried = np.dot(np.ascontiguousarray(matrix[:, first_rim:first_flow]), potential)
+        both = np.dot(potential.T, np.ascontiguousarray(carried[first_rim:first_flow]))
+        for c in range(flows):
+            for i in range(len(matrix)):
+                value = carried[i, c]
+                if first_rim <= i < first_flow:
+                    value -= angles[i - first_rim] / total
+                elif first_flow <= i < first:
+                    value = both[i - first_flow, c] - resistances[i - first_flow, c]
+                matrix[i, first_flow + c] += value
+                if i < first_flow or i >= first:
+                    matrix[first_flow + c, i] += value
     for a in range(nodes):
         for b in range(nodes):
-            matrix[first_rim + a, first_rim + b] += free[a] * free[b] * 0.5 * (ball[a, b] + ball[b, a])
+            matrix[first_rim + a, first_rim + b] += strength * 0.5 * (ball[a, b] + ball[b, a])
 
 
 def eliminate(matrix: NDArray[np.float64], inside: int, definite: bool) -> NDArray[np.float64]:
@@ -199,7 +218,7 @@ def eliminate(matrix: NDArray[np.float64], inside: int, definite: bool) -> NDArr
     inside : int
         Unknowns eliminated.
     definite : bool
-        Whether the eliminated block is positive definite; with contact disks (signed shell) it need not be.
+        Whether the eliminated block is positive definite; with contact flows it is not.
 
     Returns
     -------

@@ -7,9 +7,9 @@ Without a contact disk the level runs from 0 to 1 and the radius is level * D_q.
     radius = b + (level - 1) (D_q - b)         (level > 1: around it)
 
 Nodes: the centre; the points and arc middles of the inner rings; the middles of spokes and of diagonals; then the
-boundary, points and middles in turn. Next to the edge of a disk the middles stand at a quarter of the spoke, so that
-the square root of the distance from that edge is represented exactly (quarter-point elements, Barsoum 1976,
-doi:10.1002/nme.1620100103).
+boundary, points and middles in turn. The rings get narrow towards the edge of a disk, where the temperature of the rim
+goes like the square root of the distance. (Quarter-point elements would represent that root, but it has no finite
+Dirichlet energy on the surface, which the energy of the sphere is made of.)
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def boundary_nodes(corners, counts):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def node_levels(levels, pieces, disk):  # type: ignore[no-untyped-def]
+def node_levels(levels, pieces):  # type: ignore[no-untyped-def]
     """Level and ray of every node of a fan of `pieces` boundary pieces with rings at `levels`."""
     rings = len(levels)
     inner = 1 + pieces * (4 * rings - 3)
@@ -46,17 +46,12 @@ def node_levels(levels, pieces, disk):  # type: ignore[no-untyped-def]
             level[1 + (r - 1) * 2 * pieces + q], ray[1 + (r - 1) * 2 * pieces + q] = levels[r - 1], q
     for r in range(rings):
         low, high = (0.0 if r == 0 else levels[r - 1]), levels[r]
-        part = 0.5
-        if disk and high == 1.0:
-            part = 0.75
-        elif disk and low == 1.0:
-            part = 0.25
         for k in range(pieces):
             spoke = 1 + 2 * pieces * (rings - 1) + r * pieces + k
-            level[spoke], ray[spoke] = low + part * (high - low), 2 * k
+            level[spoke], ray[spoke] = 0.5 * (low + high), 2 * k
             if r > 0:
                 diagonal = 1 + 2 * pieces * (rings - 1) + pieces * rings + (r - 1) * pieces + k
-                level[diagonal], ray[diagonal] = low + part * (high - low), 2 * k + 1
+                level[diagonal], ray[diagonal] = 0.5 * (low + high), 2 * k + 1
     for q in range(2 * pieces):
         level[inner + q], ray[inner + q] = levels[rings - 1], q
     return level, ray, inner
@@ -114,13 +109,6 @@ def node_positions(boundary, center, levels, circle, level, ray):  # type: ignor
     far = np.sqrt((arms**2).sum(axis=1))
     for a in range(len(level)):
         q, radius = ray[a], _radius(level[a], far[ray[a]], circle)
-        if circle > 0.0 and a >= diagonals and a < inner:
-            r, k = (a - diagonals) // pieces + 1, (a - diagonals) % pieces
-            low, high = levels[r - 1], levels[r]
-            if low == 1.0 or high == 1.0:  # next to the circle: part of the way from end to end
-                near = _radius(low, far[2 * k], circle)
-                end = _radius(high, far[2 * ((k + 1) % pieces)], circle)
-                radius = near + (level[a] - low) / (high - low) * (end - near)
         du, dv = arms[q, 0] / far[q], arms[q, 1] / far[q]
         if circle > 0.0 and q % 2 == 1:  # middles of arcs bisect the angle, those of the boundary its pieces
             p, n = q - 1, (q + 1) % (2 * pieces)

@@ -45,8 +45,8 @@ class Fineness:
 
     largest: float = 1.2
     growth: float = 2.0
-    disk_rings: tuple[float, ...] = (0.6, 1.0)
-    disk_growth: float = 1.5
+    disk_rings: tuple[float, ...] = (1.0,)
+    disk_growth: float = 1.4
     radial_degree: int = 3
 
 
@@ -149,7 +149,7 @@ def plan_cells(
     smaller = ends.min(axis=1)
     effective = 2.0 * ends[:, 0] * ends[:, 1] / ends.sum(axis=1)
     narrow = np.maximum(np.sqrt(np.maximum(gap, 0.0) * effective), min(1.0 / contrast, 0.3) * 0.3 * smaller)
-    narrow = np.where(common > 0.0, common / 3.0, narrow)
+    narrow = np.where(common > 0.0, common / 2.0, narrow)
     pieces = _pieces(topology, corners, fineness.largest * smaller, common)
     fan, starts, levels, areas, circles, fits = _fans(
         polygons.starts,

@@ -10,9 +10,8 @@ On the unit square of (facet) x (t) the energy is
     int int k { |grad_f T - t T_t grad_f rho / B|^2 B + T_t^2 (1 - (1 - t) B / rho)^2 / B } dS dt
 
 with grad_f the gradient along the facet as seen from the centre (the projected metric e_i . e_j - rho_i rho_j) and
-dS its area: the powers of the radius cancel. All integrals over t are polynomials and done beforehand. Where the facet
-cuts the sphere B < 0: with k of the sphere this takes the lens beyond the facet away from the energy of the whole
-sphere (signed shell).
+dS its area: the powers of the radius cancel. All integrals over t are polynomials and done beforehand. There is no
+fluid on a contact disk.
 """
 
 from __future__ import annotations
@@ -48,20 +47,19 @@ def radial_moments(degree: int) -> NDArray[np.float64]:
 
 @njit(cache=True)
 def shell_matrices(nodes, offsets, triangles, on_disk, medium, moments, rule):  # type: ignore[no-untyped-def]
-    """Energy of the shell over all radial functions of all nodes, and the Laplace-Beltrami stiffness of the rim.
+    """Energy of the shell over all radial functions of all nodes; Laplace-Beltrami stiffness and angles of the rim.
 
     `nodes`, shape (2, n, 2), and `offsets`, shape (2, n) (height of the facet above the sphere's radius): around the
-    contact disk and on it. `medium` = (R, conductivity around the disk, conductivity on it). Returns matrices of
-    shape (functions * n, functions * n) and (n, n).
+    contact disk and on it. `medium` = (R, conductivity of the fluid). Returns arrays of shape (functions * n,
+    functions * n), (n, n) and (n,).
     """
     shapes, weights = rule
-    radius, outside, inside = medium
+    radius, fluid = medium
     n, functions = nodes.shape[1], moments.shape[1]
-    energy, rim = np.zeros((functions * n, functions * n)), np.zeros((n, n))
+    energy, rim, angles = np.zeros((functions * n, functions * n)), np.zeros((n, n)), np.zeros(n)
     grad, slope = np.empty((6, 6)), np.empty(6)
     for t in range(len(triangles)):
         where = 1 if on_disk[t] else 0
-        k = inside if on_disk[t] else outside
         for g in range(len(weights)):
             # point, its two derivatives: (offset, u, v)
             p0 = p1 = p2 = 0.0
@@ -89,7 +87,13 @@ def shell_matrices(nodes, offsets, triangles, on_disk, medium, moments, rule):  
                 for b in range(6):
                     grad[a, b] = up * shapes[g, 1, b] + vp * shapes[g, 2, b]
             steep = (g22 * rx * rx - 2.0 * g12 * rx * ry + g11 * ry * ry) / det
-            w, beta = k * area, thickness / rho
+            w, beta = fluid * area, thickness / rho
+            for a in range(6):
+                angles[triangles[t, a]] += area / (rho * rho) * shapes[g, 0, a]
+                for b in range(6):
+                    rim[triangles[t, a], triangles[t, b]] += area * grad[a, b]
+            if on_disk[t]:
+                continue
             for p in range(functions):
                 for q in range(functions):
                     along = w * thickness * moments[0, p, q]
@@ -107,7 +111,4 @@ def shell_matrices(nodes, offsets, triangles, on_disk, medium, moments, rule):  
                             energy[row, q * n + triangles[t, b]] += (
                                 along * grad[a, b] - m1 * slope[a] * nb - m2 * na * slope[b] + across * na * nb
                             )
-            for a in range(6):
-                for b in range(6):
-                    rim[triangles[t, a], triangles[t, b]] += area * grad[a, b]
-    return energy, rim
+    return energy, rim, angles

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from etc_engine.box import Box
 from etc_engine.engines.dtem.cell_3d.cells import CellSystem
-from etc_engine.solvers import Preconditioner, SolveReport, build_preconditioner, solve_energy
+from etc_engine.solvers import Limits, Preconditioner, SolveReport, build_preconditioner, solve_energy
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -233,7 +233,7 @@ def solve_cells(
             float(energy[axis, axis]),
             preconditioner=preconditioner,
             tolerance=tolerance,
-            max_iterations=MOST_ITERATIONS,
+            limits=Limits(max_iterations=MOST_ITERATIONS),
             conserved=np.where(free & (np.arange(system.size) < system.vertices), 1.0, 0.0),
         )
         temperatures[axis] = solution

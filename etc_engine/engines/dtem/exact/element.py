@@ -17,10 +17,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Elements, Material, condense, packed_starts, refuse_indefinite
+from etc_engine.engines.dtem.element import Elements, condense, packed_starts, refuse_indefinite
 from etc_engine.engines.dtem.exact.cut_disk import potentials_at, solve_cut_disk
 from etc_engine.engines.dtem.exact.lune import LEVELS, ChordPoints, chord_points
 from etc_engine.errors import GeometryError
+from etc_engine.laws.disk import position_angles
 from etc_engine.medium.sides import ContactSides, refuse_overlap
 
 MODES = 3
@@ -60,15 +61,15 @@ class Chords(NamedTuple):
     signs: NDArray[np.float64]
 
 
-def exact_elements(sides: ContactSides, material: Material, modes: int = MODES) -> Elements:
+def exact_elements(sides: ContactSides, conductivity: NDArray[np.float64], modes: int = MODES) -> Elements:
     """Conductivity matrices of all disks over (contact, mode).
 
     Parameters
     ----------
     sides : ContactSides
-        With ``cuts``, chords that nothing passes.
-    material : Material
-        A contact resistance acts on mode 0 alone: its temperature jump is taken as uniform over the contact.
+        With ``cuts``, chords that nothing passes. A contact resistance acts on mode 0 alone: its temperature jump is
+        taken as uniform over the contact.
+    conductivity : ndarray, shape (n,) [W/(m K)]
     modes : int
 
     Returns
@@ -85,15 +86,15 @@ def exact_elements(sides: ContactSides, material: Material, modes: int = MODES) 
     The Neumann problem of the cut disk is solved to about 1e-8 (see
     `etc_engine.engines.dtem.exact.cut_disk`) for any number of modes, in about a millisecond per disk.
     """
-    chords = cut_chords(sides, material, modes=modes)
+    chords = cut_chords(sides, conductivity, modes=modes)
     offsets = modes * sides.offsets
     starts = packed_starts(offsets)
     values = np.zeros(int(starts[-1]))
     bad = _fill(
         sides.offsets,
         chords,
-        material.side_resistances(sides),
-        material.conductivity,
+        sides.resistances,
+        conductivity,
         modes,
         starts,
         values,
@@ -104,7 +105,9 @@ def exact_elements(sides: ContactSides, material: Material, modes: int = MODES) 
     return Elements(modes, offsets, nodes, starts, values)
 
 
-def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.float64]) -> NDArray[np.float64]:
+def exact_potentials(
+    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Weighted mean temperature of every chord above that of its disk's centre, shape (s,), of flows (s, modes).
 
     Parameters
@@ -112,14 +115,14 @@ def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.
     sides : ContactSides
         All sides of a network; ``cuts`` tells which of its wall contacts are insulated chords, the other ones
         without flux are points of the arc.
-    material : Material
+    conductivity : ndarray, shape (n,) [W/(m K)]
     flows : ndarray, shape (s, modes) [W/m]
     """
-    chords, on_arc = chords_of_field(sides, material, flows)
+    chords, on_arc = chords_of_field(sides, conductivity, flows)
     return _potentials(
         chords,
-        material.side_resistances(sides),
-        material.conductivity,
+        sides.resistances,
+        conductivity,
         np.ascontiguousarray(flows),
         sides.offsets,
         on_arc,
@@ -128,21 +131,21 @@ def exact_potentials(sides: ContactSides, material: Material, flows: NDArray[np.
 
 
 def chords_of_field(
-    sides: ContactSides, material: Material, flows: NDArray[np.float64]
+    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
 ) -> tuple[Chords, NDArray[np.float64]]:
     """Chords of a whole network with flows (s, modes), and the angle of wall contacts that cut nothing, else NaN."""
     uncut = np.zeros(sides.nodes.size, dtype=np.bool_)
     uncut[sides.of_walls] = ~flows[sides.of_walls].any(axis=1)
     cut_rows = sides.of_walls[sides.cuts.walls]
-    chords = cut_chords(sides, material, uncut, cut_rows, modes=flows.shape[1])
-    on_arc = np.where(uncut, sides.theta, np.nan)
+    chords = cut_chords(sides, conductivity, uncut, cut_rows, modes=flows.shape[1])
+    on_arc = np.where(uncut, position_angles(sides.arms), np.nan)
     on_arc[cut_rows] = np.nan
     return chords, on_arc
 
 
 def cut_chords(
     sides: ContactSides,
-    material: Material,
+    conductivity: NDArray[np.float64],
     uncut: NDArray[np.bool_] | None = None,
     cut_rows: NDArray[np.int64] | None = None,
     *,
@@ -155,16 +158,17 @@ def cut_chords(
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=sides.offsets.size - 1))])
     rows = np.concatenate([kept, np.full(cuts.particles.size, -1) if cut_rows is None else cut_rows])[order]
-    theta = np.concatenate([sides.theta[kept], cuts.theta])[order]
+    arms = np.concatenate([sides.arms[kept], cuts.arms])[order]
+    theta = position_angles(arms)
     alpha = np.concatenate([sides.alpha[kept], cuts.alpha])[order]
-    exponents = np.concatenate([edge_exponents(sides, material)[kept], np.ones(cuts.particles.size)])[order]
+    exponents = np.concatenate([edge_exponents(sides, conductivity)[kept], np.ones(cuts.particles.size)])[order]
     signs = np.concatenate([sides.mode_signs[kept], np.ones(cuts.particles.size)])[order]
-    refuse_overlap(offsets, np.stack([np.cos(theta), np.sin(theta)], axis=1), alpha)
+    refuse_overlap(offsets, arms, alpha)
     levels = _choose_levels(offsets, theta, alpha, modes)
     return Chords(offsets, rows, theta, alpha, exponents, levels, signs)
 
 
-def edge_exponents(sides: ContactSides, material: Material) -> NDArray[np.float64]:
+def edge_exponents(sides: ContactSides, conductivity: NDArray[np.float64]) -> NDArray[np.float64]:
     """Exponent b of the flux (1 - s^2)^(b - 1) at the ends of each side's contact, shape (s,).
 
     Wedges of conductivity kappa_A, kappa_B and angles pi - alpha_A, pi - alpha_B that meet, insulated outside, have
@@ -172,7 +176,7 @@ def edge_exponents(sides: ContactSides, material: Material) -> NDArray[np.float6
     an isothermal wall b = pi/(2 (pi - alpha_A)).
     """
     a, b = np.pi - sides.alpha[sides.of_contacts].T
-    kappa_a, kappa_b = material.conductivity[sides.particles[sides.of_contacts]].T
+    kappa_a, kappa_b = conductivity[sides.particles[sides.of_contacts]].T
     low, high = 0.5 * np.pi / np.maximum(a, b), 0.5 * np.pi / np.minimum(a, b)
     for _ in range(60):  # halving down to round-off; the left side rises through its only zero between the two poles
         middle = 0.5 * (low + high)

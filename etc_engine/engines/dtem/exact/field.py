@@ -6,7 +6,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Material
 from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
 from etc_engine.engines.dtem.exact.element import Chords, chords_of_field, of_disk
 from etc_engine.engines.dtem.exact.lune import ChordPoints, chord_points
@@ -40,7 +39,7 @@ def loaded_waves(
 
 def exact_temperatures(
     sides: ContactSides,
-    material: Material,
+    conductivity: NDArray[np.float64],
     flows: NDArray[np.float64],
     particles: NDArray[np.int64],
     points: NDArray[np.float64],
@@ -51,18 +50,18 @@ def exact_temperatures(
     ----------
     sides : ContactSides
         All sides of a network, with ``cuts``.
-    material : Material
+    conductivity : ndarray, shape (n,) [W/(m K)]
     flows : ndarray, shape (s, modes) [W/m]
     particles : ndarray of int, shape (q,)
     points : ndarray, shape (q, 2)
         Position from the particle's centre in its radii; a point beyond a chord takes its value on the chord.
     """
-    chords, _ = chords_of_field(sides, material, flows)
+    chords, _ = chords_of_field(sides, conductivity, flows)
     order = np.argsort(particles, kind="stable")
     z = points[order, 0] + 1j * points[order, 1]
     values = np.zeros(particles.size)
     flows = np.ascontiguousarray(flows)
-    values[order] = _inside(chords, material.conductivity, flows, particles[order], z, chord_points(chords.levels))
+    values[order] = _inside(chords, conductivity, flows, particles[order], z, chord_points(chords.levels))
     return values
 
 

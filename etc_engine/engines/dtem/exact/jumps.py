@@ -17,8 +17,6 @@ with Y so small, and a = 1 up to |x| so large, that it vanishes on the other con
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -49,9 +47,8 @@ def jump_energies(solution: SteadySolution, load: int = 0) -> NDArray[np.float64
         Of method ``exact``.
     load : int
     """
-    sides, kappa = solution.sides, solution.material.conductivity
-    material = replace(solution.material, contact_resistance=np.zeros(sides.nodes.max(initial=-1) + 1))
-    chords = cut_chords(sides, material, modes=solution.modes)
+    sides, kappa = solution.sides, solution.medium.conductivity
+    chords = cut_chords(sides, kappa, modes=solution.modes)
     chi = np.linspace(-REACH, REACH, 2 * REACH + 1) * STEP
     deviations = np.zeros((sides.nodes.size, chi.size))
     flows = np.ascontiguousarray(solution.flows[:, :, load])

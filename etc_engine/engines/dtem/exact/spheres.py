@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.element import (
     Elements,
-    Material,
     cholesky_inverse,
     condense,
     packed_starts,
@@ -39,15 +38,15 @@ RAISE = 1.0
 """Added to V between whole heat flows, which keeps it positive definite and changes no difference of temperatures."""
 
 
-def exact_sphere_elements(sides: ContactSides, material: Material, modes: int) -> Elements:
+def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
     """Conductivity matrices of all spheres over (contact, mode).
 
     Parameters
     ----------
     sides : ContactSides
-        With ``cuts``, disks that nothing passes.
-    material : Material
-        A contact resistance acts on mode 0 alone: its temperature jump is taken as uniform over the contact.
+        With ``cuts``, disks that nothing passes. A contact resistance acts on mode 0 alone: its temperature jump is
+        taken as uniform over the contact.
+    conductivity : ndarray, shape (n,) [W/(m K)]
     modes : int
         (degree + 1)(degree + 2)/2 for the modes m + 2k <= degree.
 
@@ -86,8 +85,8 @@ def exact_sphere_elements(sides: ContactSides, material: Material, modes: int) -
         np.ones(alpha.size, dtype=np.bool_),
         tables,
         own_blocks(tables, alpha),
-        material.conductivity * sides.radii,
-        material.side_resistances(sides),
+        np.ascontiguousarray(conductivity * sides.radii),
+        sides.resistances,
         starts,
         values,
     )
@@ -96,7 +95,9 @@ def exact_sphere_elements(sides: ContactSides, material: Material, modes: int) -
     return Elements(modes, modes * sides.offsets, nodes, starts, values)
 
 
-def exact_sphere_potentials(sides: ContactSides, material: Material, flows: NDArray[np.float64]) -> NDArray[np.float64]:
+def exact_sphere_potentials(
+    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Weighted mean temperature of every contact above that of its sphere's centre, shape (s,), of flows (s, modes).
 
     Parameters
@@ -104,7 +105,7 @@ def exact_sphere_potentials(sides: ContactSides, material: Material, flows: NDAr
     sides : ContactSides
         All sides of a network; ``cuts`` tells which of its wall contacts are cut. Other contacts without flux are
         read in the uncut sphere.
-    material : Material
+    conductivity : ndarray, shape (n,) [W/(m K)]
     flows : ndarray, shape (s, modes) [W]
     """
     tables = mode_tables(_degree(flows.shape[1]))
@@ -121,11 +122,11 @@ def exact_sphere_potentials(sides: ContactSides, material: Material, flows: NDAr
         cutting,
         tables,
         own_blocks(tables, sides.alpha),
-        material.conductivity * sides.radii,
+        np.ascontiguousarray(conductivity * sides.radii),
         np.ascontiguousarray(flows),
         potentials,
     )
-    return potentials + material.side_resistances(sides) * flows[:, 0]
+    return potentials + sides.resistances * flows[:, 0]
 
 
 def _degree(modes: int) -> int:

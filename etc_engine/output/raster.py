@@ -6,24 +6,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.field import ParticleField
-from etc_engine.engines.dtem.interior import temperatures_inside
-from etc_engine.engines.dtem.steady import SteadySolution
+from etc_engine.medium.field import ParticleField
 
 
-def sample_image(
-    solution: SteadySolution, field: ParticleField, pixels: int = 600, load: int = 0
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def sample_image(field: ParticleField, pixels: int = 600) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Temperatures on a regular grid of pixels over the box.
 
     Parameters
     ----------
-    solution : SteadySolution
     field : ParticleField
+        Of disks whose inner temperatures are known.
     pixels : int
         Pixels along the longer edge of the box.
-    load : int
-        Load of the field: its axis carries the mean gradient of a periodic box.
 
     Returns
     -------
@@ -32,15 +26,16 @@ def sample_image(
     owners : ndarray of int, shape (ny, nx)
         Particle of each pixel, -1 outside. Where disks overlap their common chord separates them.
     """
-    packing = solution.network.packing
+    assert field.inside is not None
+    packing = field.medium.packing
     lengths = np.asarray(packing.box.lengths)
     nx, ny = (max(round(float(pixels * length / lengths.max())), 1) for length in lengths)
     owners, offsets = _owners(packing.centers, packing.radii, lengths, np.asarray(packing.box.periodic), nx, ny)
     rows, columns = np.nonzero(owners >= 0)
     temperatures = np.full(owners.shape, np.nan)
     particles = owners[rows, columns]
-    temperatures[rows, columns] = temperatures_inside(solution, field, particles, offsets[rows, columns])
-    axis = solution.axes[load]
+    temperatures[rows, columns] = field.inside(particles, offsets[rows, columns])
+    axis = field.axis
     if packing.box.periodic[axis]:  # a pixel of an image of the particle lies whole boxes up the gradient
         centre = (columns + 0.5) / nx if axis == 0 else (rows + 0.5) / ny
         image = centre * lengths[axis] - offsets[rows, columns, axis] - packing.centers[particles, axis]

@@ -1,0 +1,59 @@
+"""Temperatures and heat flows of every particle and contact under one load, in the same terms for all engines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.sides import ContactSides
+
+Inside = Callable[[NDArray[np.int64], NDArray[np.float64]], NDArray[np.float64]]
+"""(particle of each point, position relative to its centre [m]) -> temperature [K]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleField:
+    """Temperatures and heat flows of one load on a whole contact network.
+
+    Parameters
+    ----------
+    medium : Medium
+    axis : int
+        Of the load: walls at temperature 1 (low end) and 0 (far end), or a mean gradient of 1 along a periodic axis.
+    sides : ContactSides
+        All contact sides of the network.
+    particle_temperatures : ndarray, shape (n,) [K]
+        Mean temperature of each particle; NaN where no contacts lead to a spanning cluster or a driven wall.
+        Along a periodic axis the particle's home image, mean gradient included.
+    contact_temperatures : ndarray, shape (m,) [K]
+        Mean temperature of each particle contact, seen from its first particle.
+    wall_temperatures : ndarray, shape (w,) [K]
+        Temperature of each wall contact.
+    contact_flows : ndarray, shape (m,) [W, in 2D W/m]
+        Heat flow from the first particle of each contact to the second.
+    wall_flows : ndarray, shape (w,) [W, in 2D W/m]
+        Heat flow from the particle into each wall.
+    face_temperatures : ndarray, shape (m, 2) [K]
+        Temperature of the face of each particle contact on either particle, T_contact - R_c Q_into / 2, in the
+        frame of the first particle. Equal where there is no contact resistance.
+    flow_modes : ndarray, shape (s, M)
+        Flux modes into the particle at each side; mode 0 is the heat flow.
+    inside : callable, optional
+        Temperature at points inside particles, of engines that know it.
+    """
+
+    medium: Medium
+    axis: int
+    sides: ContactSides
+    particle_temperatures: NDArray[np.float64]
+    contact_temperatures: NDArray[np.float64]
+    wall_temperatures: NDArray[np.float64]
+    contact_flows: NDArray[np.float64]
+    wall_flows: NDArray[np.float64]
+    face_temperatures: NDArray[np.float64]
+    flow_modes: NDArray[np.float64]
+    inside: Inside | None = None

@@ -1,0 +1,87 @@
+"""Voxel images of labelled phases: the same array from every kind of file, and its conductivity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from etc_engine.engines.voxel.images import homogenize_image
+from etc_engine.errors import InputError
+from etc_engine.particle_files.images import is_image, read_image
+
+LABELS = np.random.default_rng(88).integers(0, 3, (4, 5, 6))
+
+
+def test_every_kind_of_file_holds_the_same_voxels(tmp_path):
+    np.save(tmp_path / "a.npy", LABELS.astype(np.uint8))
+    LABELS.T.astype("<u2").tofile(tmp_path / "a.raw")  # x runs fastest
+    found = [read_image(tmp_path / "a.npy"), read_image(tmp_path / "a.raw", (4, 5, 6), "uint16")]
+    try:
+        import tifffile
+    except ImportError:
+        tifffile = None
+    if tifffile is not None:
+        tifffile.imwrite(tmp_path / "a.tif", LABELS.T.astype(np.uint8), photometric="minisblack")
+        found.append(read_image(tmp_path / "a.tif"))
+        assert is_image(tmp_path / "a.tif")
+    for image in found:
+        np.testing.assert_array_equal(image.labels, LABELS)
+        assert image.phases == (0, 1, 2)
+        assert sum(image.fractions) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (np.zeros((4, 4)), "holds one phase only"),
+        (np.arange(400.0).reshape(20, 20), "400 different values: label its phases first"),
+        (np.array([[0.5, 1.0]]), "label the grey levels first"),
+        (np.zeros((2, 2, 2, 2)), "two or three axes"),
+        (np.array(["a"]), "whole numbers|NumPy|two or three"),
+    ],
+)
+def test_images_refused_by_name(tmp_path, values, words):
+    np.save(tmp_path / "a.npy", values)
+    with pytest.raises(InputError, match=words):
+        read_image(tmp_path / "a.npy")
+
+
+def test_raw_files_need_their_shape(tmp_path):
+    LABELS.astype(np.uint8).tofile(tmp_path / "a.raw")
+    with pytest.raises(InputError, match="give its shape"):
+        read_image(tmp_path / "a.raw")
+    with pytest.raises(InputError, match="has 120 bytes, 4 x 5 x 7 voxels of uint8 need 140"):
+        read_image(tmp_path / "a.raw", (4, 5, 7))
+    with pytest.raises(InputError, match="there is no file"):
+        read_image(tmp_path / "none.raw", (4, 5, 6))
+
+
+def test_layers_are_exact():
+    """Series across three layers of different phases, parallel along them."""
+    labels = np.repeat(np.array([0, 1, 7]), [4, 2, 2])[:, None] * np.ones((1, 6), dtype=int)
+    solution, error = homogenize_image(labels, {0: 1.0, 1: 4.0, 7: 10.0}, (2.0, 1.0))
+    assert np.diag(solution.tensor) == pytest.approx([1 / (0.5 + 0.25 / 4 + 0.25 / 10), 0.5 + 1.0 + 2.5], rel=1e-8)
+    assert error < 1e-6
+
+
+def test_a_checkerboard_conducts_the_geometric_mean():
+    """Dykhne 1970: sqrt(k1 k2), to the error that is estimated."""
+    n = 32
+    labels = np.kron(np.array([[0, 1], [1, 0]]), np.ones((n, n), dtype=int))
+    solution, error = homogenize_image(labels, {0: 1.0, 1: 4.0}, (1.0, 1.0))
+    assert abs(solution.tensor[0, 0] / 2.0 - 1.0) < 2.0 * error < 0.1
+
+
+def test_insulators_are_checked_on_a_finer_grid():
+    labels = np.zeros((16, 16), dtype=int)
+    labels[4:12, 4:12] = 1
+    solution, error = homogenize_image(labels, {0: 1.0, 1: 0.0}, (1.0, 1.0))
+    finer, _ = homogenize_image(np.kron(labels, np.ones((4, 4), dtype=int)), {0: 1.0, 1: 0.0}, (1.0, 1.0))
+    assert abs(solution.tensor[0, 0] / finer.tensor[0, 0] - 1.0) < 2.0 * error < 0.1
+
+
+def test_phases_without_a_conductivity_are_named():
+    with pytest.raises(InputError, match="labels 0, 3: the conductivity of 3 is missing"):
+        homogenize_image(np.array([[0, 3]]), {0: 1.0}, (1.0, 1.0))
+    with pytest.raises(InputError, match="label 3 must not be negative"):
+        homogenize_image(np.array([[0, 3]]), {0: 1.0, 3: -1.0}, (1.0, 1.0))
