@@ -15,7 +15,7 @@ DETAILED = 3_000
 """Above this many spheres each is a point of its mean temperature, to be drawn as a glyph of its radius."""
 
 
-def write_sphere_vtp(path: Path, field: ParticleField, modules: dict[str, Any]) -> None:
+def write_sphere_vtp(path: Path, field: ParticleField) -> None:
     """Write spheres and contacts to a ``.vtp`` file.
 
     Point data ``temperature`` (NaN on the ends of lines) and ``radius`` [m]; cell data ``particle`` (-1 on lines),
@@ -26,29 +26,32 @@ def write_sphere_vtp(path: Path, field: ParticleField, modules: dict[str, Any]) 
     ----------
     path : path
     field : ParticleField
-    modules : dict
-        The parts of the library ``vtk``: ``arrays``, ``core``, ``model``, ``files``.
 
     Raises
     ------
     OutputError
         If the file cannot be written.
     """
-    arrays, data = modules["arrays"], modules["model"].vtkPolyData()
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkPolyData
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    data = vtkPolyData()
     points, temperatures, cells, owner = _surfaces(field)
     lines, flow = _lines(field)
     radii = field.medium.packing.radii
     of_points = np.repeat(np.arange(radii.size), len(points) // radii.size)
-    places = modules["core"].vtkPoints()
-    places.SetData(arrays.numpy_to_vtk(np.concatenate([points, lines.reshape(-1, 3)]), deep=True))
+    places = vtkPoints()
+    places.SetData(numpy_to_vtk(np.concatenate([points, lines.reshape(-1, 3)]), deep=True))
     data.SetPoints(places)
     ends = len(points) + np.arange(2 * len(flow)).reshape(-1, 2)
-    surfaces = _cells(cells, modules)
+    surfaces = _cells(cells)
     if cells.shape[1] == 1:
         data.SetVerts(surfaces)
     else:
         data.SetPolys(surfaces)
-    data.SetLines(_cells(ends, modules))
+    data.SetLines(_cells(ends))
     on_lines = np.full(len(flow), np.nan)
     mean = field.particle_temperatures[owner]
     none = np.full(2 * len(flow), np.nan)
@@ -66,20 +69,22 @@ def write_sphere_vtp(path: Path, field: ParticleField, modules: dict[str, Any]) 
             (name, np.concatenate([on_sphere, on_line] if first else [on_line, on_sphere]), data.GetCellData())
         )
     for name, values, place in parts:
-        array = arrays.numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+        array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
         array.SetName(name)
         place.AddArray(array)
-    writer = modules["files"].vtkXMLPolyDataWriter()
+    writer = vtkXMLPolyDataWriter()
     writer.SetFileName(str(path))
     writer.SetInputData(data)
     if not writer.Write():
         raise OutputError(f"cannot write {path}")
 
 
-def _cells(rows: NDArray[np.int64], modules: dict[str, Any]) -> Any:
+def _cells(rows: NDArray[np.int64]) -> Any:
     """Cells of one width out of rows of point numbers."""
-    ids = modules["arrays"].numpy_to_vtkIdTypeArray
-    cells = modules["model"].vtkCellArray()
+    from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray as ids
+    from vtkmodules.vtkCommonDataModel import vtkCellArray
+
+    cells = vtkCellArray()
     offsets = rows.shape[1] * np.arange(len(rows) + 1)
     cells.SetData(ids(offsets.astype(np.int64), deep=True), ids(rows.ravel().astype(np.int64), deep=True))
     return cells

@@ -2,8 +2,8 @@
 
 Run by hand: ``OMP_NUM_THREADS=1 python tests/benchmarks/bench_spheres.py [--spheres 1e3 1e4 1e5]``. Prints microseconds
 per element of six and of twelve contacts by each method, then a table over the number of spheres: seconds of
-``etc-engine solve FILE --periodic xyz --axis all --json`` (start of the interpreter included), its peak memory less that
-of a run with 27 spheres, unknowns and iterations. The bed is a cubic array with random vacancies, places and radii.
+``etc-engine solve FILE --periodic xyz --axis all --json`` (start of the interpreter included), its peak memory less
+that of a run with 27 spheres, unknowns and iterations. The bed is a cubic array with vacancies and random radii.
 """
 
 from __future__ import annotations
@@ -96,9 +96,10 @@ def main() -> None:
         for count in counts:
             packing = bed(count)
             seconds, memory, result = solve(packing, Path(folder))
+            own = (memory - least) * 1024.0 / packing.count
             print(
-                f"{packing.count:7d}  {result['contacts']:8d}  {seconds:7.2f}  "
-                f"{(memory - least) * 1024.0 / packing.count:9.2f}  {result['conductivity']:.5f}  {result['iterations']}"
+                f"{packing.count:7d}  {result['contacts']:8d}  {seconds:7.2f}  {own:9.2f}  "
+                f"{result['conductivity']:.5f}  {result['iterations']}"
             )
 
 

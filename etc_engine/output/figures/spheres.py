@@ -210,4 +210,4 @@ def _draw_edges(axes: Axes, packing: ParticlePacking) -> None:
         style = "--" if packing.box.periodic[axis] else "-"
         axes.plot(*ends.T, style, color="0.35", linewidth=1.0, zorder=0)
         outwards = ends[1] + 0.04 * (ends[1] - ends[0])
-        axes.text(*outwards, AXES[axis], fontsize=9, ha="center", va="center")
+        axes.text(float(outwards[0]), float(outwards[1]), AXES[axis], fontsize=9, ha="center", va="center")
