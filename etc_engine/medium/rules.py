@@ -77,10 +77,15 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
             f"particle {pairs[row, side]} overlaps particle {pairs[row, 1 - side]} so far that the contact half-angle "
             f"is {np.degrees(angles[row, side]):.2f} degrees; it must be below 90"
         )
-    wall_particles, walls, wall_distances = wall_distances_within(packing, ROUND_OFF_OVERLAP, -1.0)
-    wall_radii = radii[wall_particles]
-    wall_angles = 2.0 * np.arcsin(np.sqrt(np.clip((wall_radii - wall_distances) / (2.0 * wall_radii), 0.0, 1.0)))
-    return _without_resistance(packing, (pairs, shifts, angles), (wall_particles, walls, wall_angles), "overlap")
+    return perfect_contacts(packing, (pairs, shifts, angles), overlap_walls(packing), "overlap")
+
+
+def overlap_walls(packing: ParticlePacking) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Contacts that walls cut out of particles: (particle, wall, half-angle), cos alpha = distance/R."""
+    particles, walls, distances = wall_distances_within(packing, ROUND_OFF_OVERLAP, -1.0)
+    radii = packing.radii[particles]
+    angles = 2.0 * np.arcsin(np.sqrt(np.clip((radii - distances) / (2.0 * radii), 0.0, 1.0)))
+    return particles, walls, angles
 
 
 def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float = 1e-6) -> ContactNetwork:
@@ -198,10 +203,10 @@ def _bonded(near: Neighbors, half_angle: float, rule: str) -> ContactNetwork:
     check_half_angle(half_angle)
     links = near.pairs, near.shifts, np.full(near.pairs.shape, float(half_angle))
     at_walls = near.wall_particles, near.walls, np.full(near.walls.size, float(half_angle))
-    return _without_resistance(near.packing, links, at_walls, rule)
+    return perfect_contacts(near.packing, links, at_walls, rule)
 
 
-def _without_resistance(
+def perfect_contacts(
     packing: ParticlePacking,
     links: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
     at_walls: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
