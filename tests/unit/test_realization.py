@@ -16,7 +16,9 @@ from etc_engine.realization.media import make_media
 
 VALUES = {"bond_gap": 1e-6, "contact_resistance": 0.0, "particle_conductivity": 1.0, "pore_conductivity": 0.0}
 SPEC = RealizationSpec(
-    PackingSpec("advancing-front", parse_radii("uniform:0.02:0.04"), Box((1.0, 1.0)), density=0.75, radius_growth=False),
+    PackingSpec(
+        "advancing-front", parse_radii("uniform:0.02:0.04"), Box((1.0, 1.0)), density=0.75, radius_growth=False
+    ),
     "bonded",
     (Conduction("dtem", "chord"), Conduction("dtem", "standard")),
     VALUES,
