@@ -43,7 +43,8 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
 @click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
 @click.option(
     "--method",
-    help="Of dtem: chord, standard, enhanced, arc, exact, or cell where the pores conduct; of pipe: chord or uniform.",
+    help="Of dtem: chord, standard, enhanced, arc, exact; where the pores conduct cell (disks) or facets (spheres); "
+    "of pipe: chord or uniform.",
 )
 @click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")

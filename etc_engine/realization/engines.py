@@ -31,6 +31,7 @@ from etc_engine.realization.options import (
     DIPOLES,
     ERROR_ESTIMATE,
     GREEN,
+    MATERIAL_CURVE,
     MODES,
     Option,
     whole_number,
@@ -118,8 +119,8 @@ class Engine:
 
     @property
     def needs_contacts(self) -> bool:
-        """Whether its methods work on a contact network; otherwise they resolve the pores."""
-        return all(method.contacts for method in self.methods.values())
+        """Whether its methods heed a contact network; otherwise they resolve the pores alone."""
+        return any(method.contacts for method in self.methods.values())
 
     def default_method(self, dimension: int, pores_conduct: bool) -> str:
         """The first method that works in a dimension and with pores that conduct or do not.
@@ -287,12 +288,22 @@ ENGINES: Mapping[str, Engine] = {
                     transient=True,
                     options=("degree", "error_estimate", "bounds"),
                 ),
+                "facets": Method(
+                    "facet links: spheres and the fluid between them, one link per Laguerre facet",
+                    (3,),
+                    contacts=False,
+                    pores=MUST,
+                    transient=True,
+                    options=("dipoles", "material_curve"),
+                    gas=True,
+                ),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
             {
                 "modes": MODES,
                 "angle_curve": ANGLE_CURVE,
                 "dipoles": DIPOLES,
+                "material_curve": MATERIAL_CURVE,
                 "degree": DEGREE,
                 "error_estimate": ERROR_ESTIMATE,
                 "bounds": BOUNDS,
@@ -307,6 +318,8 @@ ENGINES: Mapping[str, Engine] = {
             {
                 "chord": Method("resistance of a contact chord", (2, 3), transient=True),
                 "uniform": Method("resistance under uniform flux (Feng et al. 2009)", (2, 3), transient=True),
+                "holm": Method("2 kappa c, for small contacts of radius c", (3,), transient=True),
+                "root-area": Method("2 kappa sqrt(A), as in some DEM codes: 1.77 times too much", (3,), transient=True),
             },
             lambda media, conduction, _: pipe.solve_series(media, conduction),
             system=pipe_system,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from etc_engine.engines.dtem import conductivity as elements
+from etc_engine.engines.dtem import facet_medium as sphere_facets
 from etc_engine.engines.dtem.cell import medium as disk_cells
 from etc_engine.engines.dtem.cell.transient import cell_system
 from etc_engine.engines.dtem.field import recover_field
@@ -50,6 +51,12 @@ CONTACTS = Family(
 
 FAMILIES: Mapping[tuple[str, int], Family] = {
     ("cell", 2): Family(disk_cells.solve_series, disk_cells.disk_field, disk_cells.accuracy_remarks, cell_system),
+    ("facets", 3): Family(
+        sphere_facets.solve_series,
+        sphere_facets.sphere_field,
+        sphere_facets.accuracy_remarks,
+        sphere_facets.sphere_system,
+    ),
 }
 """Families by method and dimension; every other method is one of `CONTACTS`."""
 
