@@ -91,8 +91,8 @@ class ImageWords:
         if self.phases is None:
             if matrix is None or inclusion is None or len(image.phases) != 2:
                 raise InputError(
-                    f"the image has the labels {', '.join(map(str, image.phases))}: give the conductivity of each, such as "
-                    f"--phases {','.join(f'{label}=1' for label in image.phases)}"
+                    f"the image has the labels {', '.join(map(str, image.phases))}: give the conductivity of "
+                    f"each, such as --phases {','.join(f'{label}=1' for label in image.phases)}"
                 )
             return dict(zip(image.phases, (matrix, inclusion), strict=True))
         if matrix is not None or inclusion is not None:
