@@ -23,9 +23,9 @@ name = "bed"
 seed = 5
 [packing]
 method = "lubachevsky-stillinger"
-radii = "equal:0.0005"
+radii = "equal"
 count = 8
-box = [1.0, 1.0, 1.0]
+box = [2e-3, 2e-3, 2e-3]
 periodic = "xyz"
 density = 0.5
 [particles]
