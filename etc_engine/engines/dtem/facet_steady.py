@@ -25,6 +25,7 @@ from etc_engine.medium.facets import FacetLinks
 from etc_engine.medium.loads import driven_walls, wall_temperatures
 from etc_engine.solvers import SolveReport, solve_loads
 from etc_engine.solvers.star import star_preconditioner
+from etc_engine.solvers.summation import inner
 
 FEW_FACETS = 9
 """Spheres with fewer facets ..."""
@@ -168,7 +169,7 @@ def solve_facets(
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
     return FacetSolution(
-        links, axes, sides, material, (starts, resistances), temperatures, flows, temperatures.T @ flows, reports
+        links, axes, sides, material, (starts, resistances), temperatures, flows, inner(temperatures, flows), reports
     )
 
 

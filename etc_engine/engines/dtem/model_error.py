@@ -105,7 +105,7 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
         raise InputError(f"the error is estimated for method chord, found a solution by {solution.method}")
     parts = np.multiply(COEFFICIENTS, chord_error_terms(solution, load)) * [1.0, 1.0, -1.0]
     flows = np.abs(solution.heat_flows[:, load])
-    rest = LEAST * (flows @ np.sin(solution.sides.alpha) ** 4) / max(float(flows.sum()), np.finfo(float).tiny)
+    rest = LEAST * (flows * np.sin(solution.sides.alpha) ** 4).sum() / max(float(flows.sum()), np.finfo(float).tiny)
     return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest)
 
 
