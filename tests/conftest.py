@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -65,8 +66,9 @@ def etc_engine(capsys):
 def made_sweep():
     """Builder of the dataset of a sweep whose conductivities are given, not computed.
 
-    ``conduct(density, angle in degrees or None, method, realization)`` is k_xx and k_yy, a pair or one number for
-    both; None is a packing that failed. The solid fraction is ``solid(density)``.
+    ``conduct(density, angle in degrees or None, method, realization)`` is the diagonal, one number per axis or one for
+    all; None is a packing that failed. Of a study that varies more than the angle, the second argument is a mapping of
+    all values. The solid fraction is ``solid(density)``.
     """
     from etc_engine.durable.provenance import this_run
     from etc_engine.realization import Outcome, Realization, Status
@@ -77,23 +79,25 @@ def made_sweep():
     from etc_engine.sweep.records import Record
     from etc_engine.sweep.table import tabulate
 
-    def cell(value, mean_field: float) -> Outcome:
+    def cell(value, dimension: int, mean_field: float) -> Outcome:
         if value is None:
             return Outcome(Status.PACKING_FAILED, "made to fail")
-        tensor = np.full((2, 2), np.nan)
+        tensor = np.full((dimension, dimension), np.nan)
         np.fill_diagonal(tensor, value)
         status = Status.OK if tensor[0, 0] > 0.0 else Status.NOT_PERCOLATING
         return Outcome(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
 
     def build(text: str, conduct, solid=lambda density: density, mean_field: float = 0.5):
         study = parse_study(text)
-        angles = study.contacts.contact_angle or (None,)
+        several = [dict(zip(study.axes, values, strict=True)) for values in product(*study.axes.values())]
+        angle = (study.quantities.get("contact_angle") or (None,))[0]
+        plain = not set(study.axes) - {"contact_angle"}
+        swept = [one.get("contact_angle", angle) for one in several] if plain else several
+        d = study.box.dimension
         records = []
         for density in study.densities:
             for r in range(study.statistics.realizations):
-                values = tuple(
-                    tuple(cell(conduct(density, a, m, r), mean_field) for m in study.conduction.methods) for a in angles
-                )
+                values = tuple(cell(conduct(density, one, m, r), d, mean_field) for one in swept for m in study.methods)
                 result = Realization(100, density, solid(density), 0.01, values)
                 unit = Unit(density, r)
                 records.append(Record(unit, result, 0, "here", 0.0, 1.0))

@@ -30,7 +30,7 @@ def realize(
     log: Path | None = None,
     trouble: bool = False,
 ) -> Realization:
-    """Conductivity = density * (1 + angle) * (1 + noise), one number of the stream a cell."""
+    """Conductivity = density * (1 + angle) * (1 + noise), one number of the stream per cell."""
     density = spec.packing.density or 0.8
     started = time.perf_counter()
     draw = float(rng.random())
@@ -38,8 +38,9 @@ def realize(
     if trouble and 0.5 < draw < 0.6:
         raise ZeroDivisionError(f"a draw of {draw}")
     cells = tuple(
-        tuple(_cell(density, angle, m, rng, trouble) for m in range(len(spec.conduction.methods)))
-        for angle in spec.contacts.contact_angles or (0.1,)
+        _cell(density, values.get("contact_angle", 0.1), m, rng, trouble)
+        for values in spec.combinations()
+        for m in range(spec.shape[-1])
     )
     if log is not None:
         with log.open("a") as stream:  # one short write in append mode: whole lines, also from many ranks

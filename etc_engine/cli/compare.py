@@ -26,8 +26,8 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     """Compare the sweep in RESULT (netCDF) with conductivity models.
 
     Prints the simulated mean with its confidence half-width beside every model of the study, and constants fitted
-    over the density. Exit status 3 if a rigorous bound is broken, which can happen to overlapping particles and to
-    composites only.
+    over the density. Exit status 3 if a rigorous bound is broken, which is possible for overlapping particles and for
+    whole cells with pores that conduct only.
     """
     from etc_engine.cli.options import check_picture, check_place, print_json
     from etc_engine.comparison import evaluate_models, fit_models, model_lines
@@ -64,7 +64,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
 
 def _cells(comparison: xarray.Dataset) -> list[tuple[dict[str, Any], xarray.Dataset]]:
     """Every cell of the sweep with its labels, densities outermost."""
-    from etc_engine.sweep.dataset import SWEPT
+    from etc_engine.study.quantities import SWEPT
 
     dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]
     indices = itertools.product(*(range(comparison.sizes[dim]) for dim in dims))
@@ -119,11 +119,11 @@ def _cell_record(labels: dict[str, Any], cell: xarray.Dataset) -> dict[str, Any]
 
 
 def _print_head(result: Path, comparison: xarray.Dataset) -> None:
+    from etc_engine.comparison.simulation import in_words
+
     level = comparison["half_width"].attrs["confidence_level"]
-    particles, pores = comparison.attrs["particle_conductivity"], comparison.attrs["pore_conductivity"]
-    conduct = ", ".join(f"{value:g}" for value in ([particles] if isinstance(particles, float) else particles))
-    around = "a matrix" if comparison.attrs["composite"] else "pores"
-    click.echo(f"{result}: particles of {conduct} W/(m K), {around} of {pores:g} W/(m K)")
+    pores, particles = (in_words(comparison.attrs[f"{name}_conductivity"]) for name in ("pore", "particle"))
+    click.echo(f"{result}: particles of {particles} W/(m K), pores of {pores} W/(m K)")
     click.echo(
         "simulation: mean of the tensor's diagonal over n realizations +- half-width of its "
         f"{100 * level:g} % Student-t interval [W/(m K)]"
@@ -140,18 +140,12 @@ def _shown(comparison: xarray.Dataset) -> list[str]:
 
 
 def _print_table(comparison: xarray.Dataset) -> None:
-    from etc_engine.sweep.dataset import SWEPT
+    from etc_engine.study.quantities import SWEPT
 
     shown = _shown(comparison)
     dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]
-    heads = {
-        "density": ["density"],
-        "contact_angle": ["contact", "angle"],
-        "contrast": ["contrast"],
-        "method": ["method"],
-    }
-    columns = [heads[dim] for dim in dims] + [["solid", "fraction"], ["n"]]
-    narrow = [10 if dim == "method" else 9 for dim in dims] + [9, 5]
+    columns = [dim.split("_") for dim in dims] + [["solid", "fraction"], ["n"]]
+    narrow = [max(9, 2 + max(map(len, dim.split("_")))) for dim in dims] + [9, 5]
     models = [name.split("_") for name in shown]
     deep = max(map(len, [*columns, *models]))
     click.echo()
@@ -198,7 +192,7 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
         click.echo(
             f"{failed} cells failed and stay out of the means (status 2 to 4, reasons in `message`): a selection"
         )
-    bound = "composites" if comparison.attrs["composite"] else "overlapping particles"
+    bound = "whole cells" if comparison.attrs["pores_conduct"] else "overlapping particles"
     if not comparison.attrs["bounds_bind"]:
         click.echo("bounds: a comparison only; Hashin-Shtrikman bounds bind overlapping geometries, not bonded ones")
     elif comparison.attrs["bound_broken"]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,9 +60,9 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
-            raise InputError(f"{name} goes with studies of kind 'network', this one is of kind 'meshless'")
+            raise InputError(f"{name} is only valid with studies of kind 'network', this one is of kind 'meshless'")
     check_place(wanted.output, wanted.study, replaces_result=True)
-    result = run_study(content)
+    result = run_study(content, str(wanted.study))
     with replacing(wanted.output) as file:
         result.assign_attrs(study_file=wanted.text).to_netcdf(file)
     click.echo(f"{wanted.output}: {dict(result.sizes)}", err=True)
@@ -78,7 +77,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
     from etc_engine.transient.run import run_transient
     from etc_engine.transient.states import remove_states, state_folder, state_path
 
-    study = parse_study(content)
+    study = parse_study(content, str(wanted.study))
     _check_outputs(study, wanted)
     states = state_folder(wanted.output)
     if wanted.resume and wanted.output.exists() and not states.exists():
@@ -121,10 +120,11 @@ def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
     """Refuse what cannot be written, or would replace an input, before the work begins."""
     from etc_engine.cli.options import check_picture, check_place
     from etc_engine.output.series import check_vtk_series
+    from etc_engine.study.transient import FileTable
 
     inputs = [wanted.study]
-    if study.particles is not None:
-        inputs.append(wanted.study.parent / study.particles)
+    if isinstance(study.packing, FileTable):
+        inputs.append(wanted.study.parent / study.packing.files)
     if wanted.plot is not None:
         check_picture(wanted.plot)
     if wanted.vtk is not None:
@@ -169,27 +169,23 @@ def _draw(series: xarray.Dataset, wanted: Wanted) -> str:
 
 
 KINDS: dict[str, Callable[[dict[str, Any], Wanted], int]] = {"meshless": _run_meshless, "network": _run_network}
-"""What runs a study, by its kind; answers the exit status."""
+"""What runs a study, by its kind; returns the exit status."""
 
 
 def read_study(path: Path) -> tuple[dict[str, Any], str]:
-    """A study file's content and text, its ``schema`` and ``kind`` checked.
+    """A study file's content and text, with a kind that is known.
 
     Raises
     ------
     StudyError
-        If the file cannot be read, is not TOML, or is of no known schema or kind.
+        If the file cannot be read, is not TOML, is of an older schema or of no known kind.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"the study {path} cannot be read: {error}") from error
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise StudyError(f"{path} is not a TOML file: {error}") from error
-    if content.get("schema") != 1:
-        raise StudyError(f"{path}: schema = 1 is expected, found {content.get('schema')!r}")
-    if content.get("kind") not in KINDS:
-        raise StudyError(f"{path}: kind = {content.get('kind')!r} is unknown: expected one of {', '.join(KINDS)}")
+    from etc_engine.study.files import parse_toml, read_text
+
+    text = read_text(path)
+    content = parse_toml(text, str(path))
+    kind = content.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        found = "missing" if kind is None else f"found {kind!r}"
+        raise StudyError(f"{path}: kind: {found}, allowed: {', '.join(KINDS)}")
     return content, text

@@ -3,7 +3,7 @@
 from etc_engine.comparison.convergence import running_statistics, samples, system_sizes
 from etc_engine.comparison.evaluation import DEFAULT_MODELS, evaluate_models, model_curve, model_lines
 from etc_engine.comparison.fits import Fit, Parameter, fit_models
-from etc_engine.comparison.simulation import Phases, half_trace, phases, simulated
+from etc_engine.comparison.simulation import Phases, mean_diagonal, phases, simulated
 
 __all__ = [
     "DEFAULT_MODELS",
@@ -12,7 +12,7 @@ __all__ = [
     "Phases",
     "evaluate_models",
     "fit_models",
-    "half_trace",
+    "mean_diagonal",
     "model_curve",
     "model_lines",
     "phases",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from etc_engine.comparison.simulation import half_trace, simulated, study_of
+from etc_engine.comparison.simulation import current_study, mean_diagonal, simulated
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
 from etc_engine.sweep.statistics import student_t
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def samples(dataset: xarray.Dataset) -> xarray.DataArray:
     """Mean of the tensor's diagonal of every realization [W/(m K)], NaN where there is none."""
-    return half_trace(dataset["conductivity"]).where(dataset["status"] <= int(Status.NOT_PERCOLATING))
+    return mean_diagonal(dataset["conductivity"]).where(dataset["status"] <= int(Status.NOT_PERCOLATING))
 
 
 def running_statistics(dataset: xarray.Dataset) -> xarray.Dataset:
@@ -68,7 +68,7 @@ def system_sizes(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
     Parameters
     ----------
     datasets : sequence of xarray.Dataset
-        Results of sweeps with the same densities, contact angles and methods.
+        Results of sweeps that vary the same.
 
     Returns
     -------
@@ -102,9 +102,9 @@ def system_sizes(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
 
 
 def _comparable(dataset: xarray.Dataset) -> dict[str, object]:
-    study = study_of(dataset)
+    study = current_study(dataset)
     packing = {key: value for key, value in study["packing"].items() if key not in ("box", "count", "radii")}
     return {
         **{f"packing.{key}": value for key, value in packing.items()},
-        **{k: study.get(k) for k in ("contacts", "conduction", "composite")},
+        **{k: study.get(k) for k in ("particles", "contacts", "pores", "radiation", "conduction")},
     }

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from etc_engine.comparison.simulation import Phases, half_trace, phases, simulated, study_of
+from etc_engine.comparison.simulation import Phases, mean_diagonal, phases, simulated, study_of
 from etc_engine.errors import InputError
 from etc_engine.models import evaluate
 from etc_engine.models.bounds import parallel, series
@@ -32,7 +31,7 @@ DEFAULT_MODELS = (
     MEAN_FIELD,
 )
 
-COMPOSITE_MODELS = (
+FILLED_MODELS = (
     "hashin_shtrikman_lower",
     "hashin_shtrikman_upper",
     "maxwell",
@@ -40,7 +39,7 @@ COMPOSITE_MODELS = (
     "effective_medium",
     "differential",
 )
-"""Those of a composite, whose particles need no contacts."""
+"""Those of particles in a medium that conducts, which need no contacts."""
 
 BINDING = ("series", "parallel", "hashin_shtrikman_lower", "hashin_shtrikman_upper")
 """Bounds of every isotropic two-phase medium; three-point bounds hold for their own zeta2 only."""
@@ -81,23 +80,21 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
 
     Notes
     -----
-    k1 is the study's ``pore_conductivity`` (of a composite, the matrix), k2 the conductivity of the particles, the
-    fraction the mean solid fraction of the density. Where the pores insulate (k1 = 0) every model with the pores as its
-    matrix is 0: Maxwell, differential medium, lower Hashin-Shtrikman. The contact mean field is the sweep's own, on the
-    networks it solved; it takes the pipe resistance of the ``chord`` method whatever the method.
+    k1 is the conductivity of the pores, k2 that of the particles, the fraction the mean solid fraction of the density.
+    Where the pores insulate (k1 = 0) every model with the pores as its matrix is 0: Maxwell, differential medium, lower
+    Hashin-Shtrikman. The contact mean field is the sweep's own, on the networks it solved; it takes the pipe resistance
+    of the ``chord`` method whatever the method.
 
-    The bounds bind a body whose two phases are what the solid fraction says: overlapping disks, and composites (there
-    beyond the interval of the mean and the estimated error of the discretization). A bonded contact conducts through a
-    neck that the solid fraction does not count, so for it they are a comparison. The Hashin-Shtrikman bounds are for
-    the mean over isotropic ensembles; every single realization and direction is held against the Wiener bounds (series,
-    parallel) of its own solid fraction, which need no isotropy. The pores of a contact network insulate: if the study
-    gives them a conductivity, a simulation below the lower bound says that their heat may not be left out.
+    The bounds bind a body whose two phases are what the solid fraction says: overlapping particles, and whole cells
+    with pores that conduct (there beyond the interval of the mean and the estimated error of the discretization). A
+    bonded contact conducts through a neck that the solid fraction does not count: for it the bounds are a comparison.
+    The Hashin-Shtrikman bounds are for the mean over isotropic ensembles. Every single realization and direction is
+    compared with the Wiener bounds (series, parallel) of its own solid fraction, which need no isotropy.
     """
     import xarray
 
-    media = phases(dataset)
-    medium = media[0]
-    parameters = _with_bounds(_wanted(dataset, models))
+    medium = phases(dataset)
+    parameters = _with_bounds(_wanted(dataset, models, medium))
     simulation = simulated(dataset)
     fraction = simulation["solid_fraction"]
     columns, notes = [], []
@@ -107,9 +104,9 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
             columns.append(dataset["mean_field_conductivity"].where(valid).mean("realization"))
             notes.append("")
         else:
-            curves = [model_curve(name, one, fraction.values, values) for one in media]
-            columns.append(_by_contrast([fraction.copy(data=curve) for curve, _ in curves], simulation))
-            notes.append(next((note for _, note in curves if note), ""))
+            column, note = model_curve(name, medium, fraction, values)
+            columns.append(column)
+            notes.append(note)
     result = simulation
     k = result["conductivity_mean"]
     labels = xarray.DataArray(np.array(list(parameters), dtype=object), dims="model", name="model")
@@ -122,33 +119,24 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         model_note=("model", np.array(notes, dtype=object)),
     )
     result.attrs |= {
-        "pore_conductivity": medium.pores,
-        "particle_conductivity": medium.particles if len(media) == 1 else [one.particles for one in media],
-        "composite": int(medium.composite),
+        "pore_conductivity": medium.pores.values.tolist(),
+        "particle_conductivity": medium.particles.values.tolist(),
+        "pores_conduct": int(medium.pores_conduct),
         "dimension": medium.dimension,
         "model_parameters": json.dumps({name: dict(values) for name, values in parameters.items()}),
     }
     _add_differences(result)
-    _add_bounds(result, dataset, media)
+    _add_bounds(result, dataset, medium)
     _add_best(result)
     for name, (meaning, units) in _MEANINGS.items():
         result[name].attrs |= {"long_name": meaning, "units": units}
     return result
 
 
-def _by_contrast(columns: Sequence[xarray.DataArray], simulation: xarray.Dataset) -> xarray.DataArray:
-    """One column, or one a contrast side by side."""
-    import xarray
-
-    if "contrast" not in simulation.dims:
-        return columns[0]
-    return xarray.concat(columns, dim=simulation["contrast"])
-
-
 def model_curve(
-    name: str, medium: Phases, fraction: NDArray[np.float64], parameters: Mapping[str, float] | None = None
-) -> tuple[NDArray[np.float64], str]:
-    """A model over solid fractions, NaN where it has no value, and a note that says why or why it is 0.
+    name: str, medium: Phases, fraction: xarray.DataArray, parameters: Mapping[str, float] | None = None
+) -> tuple[xarray.DataArray, str]:
+    """A model at solid fractions, NaN where it has no value, and a note that says why, or why it is 0.
 
     Parameters
     ----------
@@ -156,42 +144,45 @@ def model_curve(
         A name of the catalogue.
     medium : Phases
         Conductivities and dimension.
-    fraction : ndarray, shape (n,)
+    fraction : DataArray
         Solid fractions; NaN where there is none.
     parameters : mapping, optional
         Further inputs of the model.
 
     Returns
     -------
-    conductivity : ndarray, shape (n,) [W/(m K)]
+    conductivity : DataArray [W/(m K)]
+        On the dimensions of the fraction and of the two conductivities.
     note : str
 
     Examples
     --------
-    >>> model_curve("maxwell_inverse", Phases(0.0, 1.0, 2, True), np.array([0.8, 1.0]))[0].round(6)
+    >>> from xarray import DataArray
+    >>> medium, fraction = Phases(DataArray(0.0), DataArray(1.0), 2, True), DataArray([0.8, 1.0], dims="density")
+    >>> model_curve("maxwell_inverse", medium, fraction)[0].values.round(6)
     array([0.666667, 1.      ])
-    >>> model_curve("maxwell", Phases(0.0, 1.0, 2, True), np.array([0.8]))
-    (array([0.]), 'is 0: the pores insulate')
+    >>> model_curve("maxwell", medium, fraction[:1])[1]
+    'is 0: the pores insulate'
     """
-    values, reasons = np.full(fraction.shape, np.nan), []
-    for i, f in enumerate(fraction):
-        if np.isnan(f):
+    import xarray
+
+    f, pores, particles = xarray.broadcast(fraction, medium.pores, medium.particles)
+    values, reasons = np.full(f.shape, np.nan), []
+    for place in np.ndindex(f.shape):
+        if np.isnan(f.values[place]):
             continue
+        k1, k2 = float(pores.values[place]), float(particles.values[place])
         try:
-            values[i] = evaluate(
-                name,
-                k1=medium.pores,
-                k2=medium.particles,
-                fraction=float(f),
-                dimension=medium.dimension,
-                **(parameters or {}),
+            values[place] = evaluate(
+                name, k1=k1, k2=k2, fraction=float(f.values[place]), dimension=medium.dimension, **(parameters or {})
             )
         except InputError as error:
             reasons.append(str(error))
+    curve = f.copy(data=values)
     if reasons:
-        return values, reasons[0]
-    zero = medium.pores == 0.0 and bool((values[~np.isnan(values)] == 0.0).all())
-    return values, "is 0: the pores insulate" if zero else ""
+        return curve, reasons[0]
+    zero = not medium.pores_conduct and bool((values[~np.isnan(values)] == 0.0).all())
+    return curve, "is 0: the pores insulate" if zero else ""
 
 
 def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
@@ -207,9 +198,9 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``model_conductivity`` on ``model``, ``density`` and, if there, ``contrast``, with the solid fraction
-        interpolated between the densities of the sweep. Without the contact mean field, which has values on the sweep
-        only.
+        ``model_conductivity`` on ``model``, ``density`` and the dimensions that vary a conductivity, with the solid
+        fraction interpolated between the densities of the sweep. Without the contact mean field, which has values on
+        the sweep only.
     """
     import xarray
 
@@ -219,25 +210,21 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
         fine = np.linspace(density[known][0], density[known][-1], points)
         density, fraction = fine, np.interp(fine, density[known], fraction[known])
     attrs = comparison.attrs
-    media = [
-        Phases(attrs["pore_conductivity"], float(particles), attrs["dimension"], bool(attrs["bounds_bind"]))
-        for particles in np.atleast_1d(attrs["particle_conductivity"])
-    ]
+    pores, particles = comparison["pore_conductivity"], comparison["particle_conductivity"]
+    medium = Phases(pores, particles, attrs["dimension"], bool(attrs["bounds_bind"]))
     parameters = json.loads(attrs["model_parameters"])
     names = [str(name) for name in comparison["model"].values if str(name) != MEAN_FIELD]
-    values = np.array([[model_curve(name, one, fraction, parameters[name])[0] for one in media] for name in names])
-    lines = xarray.Dataset({"model_conductivity": (("model", "contrast", "density"), values)})
-    lines = lines.assign_coords(model=np.array(names, dtype=object), density=density)
-    if "contrast" not in comparison.dims:
-        return lines.isel(contrast=0)
-    return lines.assign_coords(contrast=comparison["contrast"].values)
+    fractions = xarray.DataArray(fraction, coords={"density": density}, dims="density")
+    curves = [model_curve(name, medium, fractions, parameters[name])[0] for name in names]
+    labels = xarray.DataArray(np.array(names, dtype=object), dims="model", name="model")
+    return xarray.concat(curves, dim=labels, coords="minimal", compat="override").to_dataset(name="model_conductivity")
 
 
-def _wanted(dataset: xarray.Dataset, models: Models | None) -> dict[str, Mapping[str, float]]:
+def _wanted(dataset: xarray.Dataset, models: Models | None, medium: Phases) -> dict[str, Mapping[str, float]]:
     """Names and parameters asked for, checked."""
     if models is None:
-        study = study_of(dataset)
-        models = study["models"]["names"] or (DEFAULT_MODELS if study.get("composite") is None else COMPOSITE_MODELS)
+        by_default = FILLED_MODELS if medium.pores_conduct else DEFAULT_MODELS
+        models = study_of(dataset)["models"]["names"] or by_default
     wanted = dict(models) if isinstance(models, Mapping) else {name: {} for name in models}
     for name, parameters in wanted.items():
         known = {item.name for item in find_model(name).inputs} - {"k1", "k2", "fraction"}
@@ -260,16 +247,16 @@ def _add_differences(result: xarray.Dataset) -> None:
     result["rms_relative_difference"] = np.sqrt(square.sum("density", skipna=False) / points.where(points > 0))
 
 
-def _add_bounds(result: xarray.Dataset, dataset: xarray.Dataset, media: Sequence[Phases]) -> None:
+def _add_bounds(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases) -> None:
     k, model = result["conductivity_mean"], result["model_conductivity"]
-    kind, binding = result["model_kind"], media[0].overlapping
-    slack = ROUNDING + _doubt(result, dataset, media[0])
+    kind, binding = result["model_kind"], medium.bounds_bind
+    slack = ROUNDING + _doubt(result, dataset, medium)
     above = (kind == "upper bound") & (k > model * (1.0 + slack))
     below = (kind == "lower bound") & (k < model * (1.0 - slack))
     result["outside_bound"] = (above | below).transpose(*model.dims)
     universal = result["model"].isin(BINDING)
     outside = (result["outside_bound"] & universal).any("model")
-    result["realizations_outside_bounds"] = _outside_wiener(result, dataset, media)
+    result["realizations_outside_bounds"] = _outside_wiener(dataset, medium)
     result["inside_bounds"] = ~outside & (result["realizations_outside_bounds"] == 0)
     result["bound_broken"] = result["outside_bound"] & universal & binding
     broken = binding and not bool(result["inside_bounds"].all())
@@ -277,30 +264,35 @@ def _add_bounds(result: xarray.Dataset, dataset: xarray.Dataset, media: Sequence
 
 
 def _doubt(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray | float:
-    """Relative doubt about the mean of a composite: its interval, and the error that its discretization leaves.
+    """Relative doubt about the mean of a cell with pores that conduct: its interval, and its discretization error.
 
-    Dilute composites lie on a bound, where the scatter of a few realizations passes it.
+    Dilute suspensions lie on a bound, where the scatter of a few realizations passes it.
     """
-    if not medium.composite:
+    if not medium.pores_conduct:
         return 0.0
-    discretization = dataset["relative_energy_error"].mean("realization")
-    return (result["half_width"] / result["conductivity_mean"]).fillna(0.0) + discretization.fillna(0.0)
+    errors = _errors(dataset).mean("realization")
+    return (result["half_width"] / result["conductivity_mean"]).fillna(0.0) + errors
 
 
-def _outside_wiener(result: xarray.Dataset, dataset: xarray.Dataset, media: Sequence[Phases]) -> xarray.DataArray:
+def _errors(dataset: xarray.Dataset) -> xarray.DataArray:
+    """Relative errors that the solver and the discretization leave in every cell."""
+    return dataset["relative_energy_error"].fillna(0.0) + dataset["model_error_estimate"].fillna(0.0)
+
+
+def _outside_wiener(dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray:
     """Number of realizations with a direction beyond the Wiener bounds of their own solid fraction."""
-    fraction, pores = dataset["solid_fraction"], media[0].pores
+    fraction = dataset["solid_fraction"]
     known = fraction.fillna(0.0)
     slack: xarray.DataArray | float = ROUNDING
-    if media[0].composite:
-        slack = ROUNDING + dataset["relative_energy_error"].fillna(0.0)
-    upper = _by_contrast([parallel(pores, one.particles, known) for one in media], result) * (1.0 + slack)
-    lower = _by_contrast([series(pores, one.particles, known) for one in media], result) * (1.0 - slack)
+    if medium.pores_conduct:
+        slack = ROUNDING + _errors(dataset)
+    upper = parallel(medium.pores, medium.particles, known) * (1.0 + slack)
+    lower = series(medium.pores, medium.particles, known) * (1.0 - slack)
     outside = fraction.isnull() & False
-    for i in range(media[0].dimension):
+    for i in range(medium.dimension):
         k = dataset["conductivity"].isel(direction_i=i, direction_j=i, drop=True)
         outside = outside | (k > upper) | (k < lower)
-    dims = [dim for dim in half_trace(dataset["conductivity"]).dims if dim != "realization"]
+    dims = [dim for dim in mean_diagonal(dataset["conductivity"]).dims if dim != "realization"]
     return outside.where(fraction.notnull(), False).sum("realization").transpose(*dims)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.comparison.simulation import Phases, phases, simulated
+from etc_engine.comparison.simulation import phases, simulated
 from etc_engine.models.filled_polymers import agari_uno, lewis_nielsen
 from etc_engine.sweep.statistics import student_t
 
@@ -33,13 +33,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Fit:
-    """A model fitted to the conductivities of one contact angle and method.
+    """A model fitted to conductivities over the density.
 
     Parameters
     ----------
     model : str
     selection : dict
-        ``contact_angle`` or ``contrast``, and ``method`` of the points, where the sweep has them.
+        Values of the dimensions of the sweep, besides the density, at which the points are.
     points : int
         Number of densities that entered.
     parameters : tuple of Parameter
@@ -78,6 +78,15 @@ class _Points:
     error: Floats | None
 
 
+@dataclass(frozen=True)
+class _Two:
+    """Conductivities of pores and particles [W/(m K)], and the dimension."""
+
+    pores: float
+    particles: float
+    dimension: int
+
+
 ENOUGH = 5
 """A standard error of fewer realizations is too uncertain to be a weight."""
 
@@ -98,41 +107,39 @@ def fit_models(dataset: xarray.Dataset) -> tuple[Fit, ...]:
     Returns
     -------
     tuple of Fit
-        One for every model, contact angle or contrast, and method.
+        One per model and combination of the other dimensions.
 
     Notes
     -----
     A fit needs at least one more point (density with k > 0) than constants. Intervals are those of the linearized
     problem, Student's t of the residual's degrees of freedom times the standard error, at the confidence level of
-    the study: they say how well the points determine the constants, not that the law holds. The exponent is
+    the study: they show how well the points determine the constants, not that the law holds. The exponent is
     universal close to the threshold only; points far from it give an effective one.
 
     Lewis-Nielsen and Agari-Uno describe a conducting matrix, so the study has to give the pores a conductivity.
     """
-    media, simulation = phases(dataset), simulated(dataset)
+    medium, simulation = phases(dataset), simulated(dataset)
     confidence = float(dataset.attrs.get("confidence_level", 0.95))
     swept = [dim for dim in simulation["conductivity_mean"].dims if dim != "density"]
     fits = []
     for values in itertools.product(*(simulation[dim].values.tolist() for dim in swept)):
         selection = dict(zip(map(str, swept), values, strict=True))
         cell = simulation.sel(selection)
-        medium = (
-            media[simulation["contrast"].values.tolist().index(selection["contrast"])] if len(media) > 1 else media[0]
-        )
+        two = _Two(float(cell["pore_conductivity"]), float(cell["particle_conductivity"]), medium.dimension)
         fraction, k = cell["solid_fraction"].values, cell["conductivity_mean"].values
         used = np.isfinite(fraction) & (np.nan_to_num(k) > 0.0)
         error = cell["conductivity_sem"].values[used] / k[used]
         weighted = (cell["count"].values[used] >= ENOUGH) & (np.nan_to_num(error) > 1e-9)
         points = _Points(fraction[used], k[used], error if weighted.all() else None)
-        fits += _fit_all(points, medium, selection, confidence)
+        fits += _fit_all(points, two, selection, confidence)
     return tuple(fits)
 
 
-def _fit_all(points: _Points, medium: Phases, selection: dict[str, Any], confidence: float) -> list[Fit]:
+def _fit_all(points: _Points, medium: _Two, selection: dict[str, Any], confidence: float) -> list[Fit]:
     f = points.f
     if f.size < 3 or np.ptp(f) <= 0.0:
         return [Fit("percolation_power_law", selection, f.size, note="needs conductivities at 4 densities or more")]
-    if medium.composite:
+    if medium.pores > 0.0:
         fits = [Fit("percolation_power_law", selection, f.size, note="needs pores that insulate")]
     else:
         fits = [_fit(_percolation(f, points.k), points, selection, confidence)]
@@ -167,7 +174,7 @@ def _percolation(f: Floats, k: Floats) -> _Form:
     )
 
 
-def _lewis_nielsen(f: Floats, medium: Phases) -> _Form:
+def _lewis_nielsen(f: Floats, medium: _Two) -> _Form:
     def curve(x: Floats, shape: float, limit: float) -> Floats:
         k = lewis_nielsen(medium.pores, medium.particles, x, shape, limit, dimension=medium.dimension)
         return np.log(np.where(k > 0.0, k, 1e-300))
@@ -183,7 +190,7 @@ def _lewis_nielsen(f: Floats, medium: Phases) -> _Form:
     )
 
 
-def _agari_uno(medium: Phases) -> _Form:
+def _agari_uno(medium: _Two) -> _Form:
     def curve(x: Floats, matrix: float, chain: float) -> Floats:
         return np.log(agari_uno(medium.pores, medium.particles, x, matrix, chain))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
+from etc_engine.study.files import SCHEMA
 from etc_engine.sweep.statistics import student_t
 
 if TYPE_CHECKING:
@@ -24,22 +25,24 @@ class Phases:
 
     Parameters
     ----------
-    pores, particles : float [W/(m K)]
-        Conductivity of phase 1 (pores or matrix) and of phase 2.
+    pores, particles : DataArray [W/(m K)]
+        Conductivity of phase 1 and of phase 2: a number, or one per value of the dimensions that vary it.
     dimension : int
         2 for disks, 3 for spheres.
-    overlapping : bool
+    bounds_bind : bool
         True if the simulated body is the union of the particles, whose solid fraction is known: then the bounds bind
         it. A bonded contact is wider than its geometry.
-    composite : bool
-        True if the pores are a matrix that conducts in the simulation too.
     """
 
-    pores: float
-    particles: float
+    pores: xarray.DataArray
+    particles: xarray.DataArray
     dimension: int
-    overlapping: bool
-    composite: bool = False
+    bounds_bind: bool
+
+    @property
+    def pores_conduct(self) -> bool:
+        """Whether heat goes through the pores in the simulation."""
+        return bool((self.pores > 0.0).any())
 
 
 def study_of(dataset: xarray.Dataset) -> dict[str, Any]:
@@ -62,40 +65,63 @@ def study_of(dataset: xarray.Dataset) -> dict[str, Any]:
     return study
 
 
-def phases(dataset: xarray.Dataset) -> tuple[Phases, ...]:
-    """The phases of the medium a sweep simulates, from the study stored with it: one, or one a contrast.
+def current_study(dataset: xarray.Dataset) -> dict[str, Any]:
+    """The study behind the result of a sweep, in the form of today.
+
+    Raises
+    ------
+    InputError
+        If the dataset is not the result of a sweep, or is of an older version of the engine.
+    """
+    study = study_of(dataset)
+    if study.get("schema") != SCHEMA:
+        raise InputError(
+            f"this result is of a study of schema {study.get('schema')}, from an older version of the engine: "
+            f"compare it with that version, or run the study again in schema {SCHEMA}"
+        )
+    return study
+
+
+def phases(dataset: xarray.Dataset) -> Phases:
+    """The phases of the medium that a sweep simulates.
 
     Raises
     ------
     InputError
         If the dataset is not the result of a sweep, or its particles are of two materials.
     """
-    study = study_of(dataset)
-    conduction = study["conduction"]
-    mixture = conduction.get("mixture")
-    if mixture is not None and mixture["conductivity"] != conduction["conductivity"]:
-        raise InputError(
-            f"models of two phases need particles of one material, this study mixes {conduction['conductivity']:g} and "
-            f"{mixture['conductivity']:g} W/(m K): compare it as studies/mixture does"
-        )
-    dimension = dataset.sizes["direction_i"]
-    composite = study.get("composite")
-    if composite is None:
-        pores, overlapping = float(study["models"]["pore_conductivity"]), study["contacts"]["rule"] == "overlap"
-        return (Phases(pores, float(conduction["conductivity"]), dimension, overlapping),)
-    matrix = float(composite["matrix_conductivity"])
-    contrasts = composite["contrast"] or [float(conduction["conductivity"]) / matrix]
-    return tuple(Phases(matrix, contrast * matrix, dimension, True, True) for contrast in contrasts)
+    study = current_study(dataset)
+    pores, particles = dataset["pore_conductivity"], dataset["particle_conductivity"]
+    if "mixture_conductivity" in dataset.coords:
+        other = dataset["mixture_conductivity"]
+        if not bool((other == particles).all()):
+            raise InputError(
+                f"models of two phases need particles of one material, this study mixes {in_words(particles)} and "
+                f"{in_words(other)} W/(m K): compare it as studies/mixture does"
+            )
+    bind = study["contacts"].get("rule", "overlap") == "overlap"
+    return Phases(pores, particles, dataset.sizes["direction_i"], bind)
 
 
-def half_trace(tensor: xarray.DataArray) -> xarray.DataArray:
+def in_words(values: Any) -> str:
+    """One number, or several, for readers.
+
+    Examples
+    --------
+    >>> in_words(2.0), in_words(np.array([1.0, 5.0]))
+    ('2', '1, 5')
+    """
+    return ", ".join(f"{value:g}" for value in np.ravel(values))
+
+
+def mean_diagonal(tensor: xarray.DataArray) -> xarray.DataArray:
     """Mean of the diagonal of a conductivity tensor, k = (k_xx + k_yy)/2 in the plane.
 
     Examples
     --------
     >>> import xarray
     >>> axes = {"direction_i": ["x", "y"], "direction_j": ["x", "y"]}
-    >>> float(half_trace(xarray.DataArray([[1.0, np.nan], [np.nan, 3.0]], coords=axes)))
+    >>> float(mean_diagonal(xarray.DataArray([[1.0, np.nan], [np.nan, 3.0]], coords=axes)))
     2.0
     """
     diagonal = [tensor.isel(direction_i=i, direction_j=i, drop=True) for i in range(tensor.sizes["direction_i"])]
@@ -128,14 +154,14 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     component. Realizations without a conductivity stay out; those that do not percolate count as 0.
     """
     valid = dataset["status"] <= int(Status.NOT_PERCOLATING)
-    samples = half_trace(dataset["conductivity"]).where(valid)
+    samples = mean_diagonal(dataset["conductivity"]).where(valid)
     count = dataset["count"]
     confidence = float(dataset.attrs.get("confidence_level", 0.95))
     several = count >= 2
     sem = samples.std("realization", ddof=1, skipna=True).where(several) / np.sqrt(count.where(several))
     quantiles = np.array([student_t(confidence, int(n)) if n >= 2 else np.nan for n in count.values.ravel()])
     half_width = sem * count.copy(data=quantiles.reshape(count.shape))
-    mean = half_trace(dataset["conductivity_mean"])
+    mean = mean_diagonal(dataset["conductivity_mean"])
     result = mean.to_dataset(name="conductivity_mean")
     result["conductivity_sem"] = sem
     result["half_width"] = half_width

@@ -9,12 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.medium.loaded import hertz_contacts, load_contacts
 from etc_engine.medium.network import ContactNetwork, check_half_angle
+from etc_engine.medium.touching import (
+    ROUND_OFF_OVERLAP,
+    Neighbors,
+    closest_neighbors,
+    find_neighbors,
+    wall_distances_within,
+)
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
-
-# An overlap below this part of the mean radius is round-off of a tangency, not a contact.
-ROUND_OFF_OVERLAP = 1e-10
 
 
 def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
@@ -72,10 +77,15 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
             f"particle {pairs[row, side]} overlaps particle {pairs[row, 1 - side]} so far that the contact half-angle "
             f"is {np.degrees(angles[row, side]):.2f} degrees; it must be below 90"
         )
-    wall_particles, walls, wall_distances = _wall_distances(packing, ROUND_OFF_OVERLAP, -1.0)
-    wall_radii = radii[wall_particles]
-    wall_angles = 2.0 * np.arcsin(np.sqrt(np.clip((wall_radii - wall_distances) / (2.0 * wall_radii), 0.0, 1.0)))
-    return _without_resistance(packing, (pairs, shifts, angles), (wall_particles, walls, wall_angles), "overlap")
+    return perfect_contacts(packing, (pairs, shifts, angles), overlap_walls(packing), "overlap")
+
+
+def overlap_walls(packing: ParticlePacking) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Contacts that walls cut out of particles: (particle, wall, half-angle), cos alpha = distance/R."""
+    particles, walls, distances = wall_distances_within(packing, ROUND_OFF_OVERLAP, -1.0)
+    radii = packing.radii[particles]
+    angles = 2.0 * np.arcsin(np.sqrt(np.clip((radii - distances) / (2.0 * radii), 0.0, 1.0)))
+    return particles, walls, angles
 
 
 def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float = 1e-6) -> ContactNetwork:
@@ -145,48 +155,6 @@ def coordination_contacts(packing: ParticlePacking, half_angle: float, coordinat
     return _bonded(closest_neighbors(packing, coordination), half_angle, "coordination")
 
 
-@dataclass(frozen=True, eq=False)
-class Neighbors:
-    """Who touches whom, without a width.
-
-    Parameters
-    ----------
-    packing : ParticlePacking
-    pairs, shifts, wall_particles, walls : ndarray of int
-        As in `ContactNetwork`.
-    """
-
-    packing: ParticlePacking
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    wall_particles: NDArray[np.int64]
-    walls: NDArray[np.int64]
-
-
-def find_neighbors(packing: ParticlePacking, gap: float) -> Neighbors:
-    """Particles and walls whose surfaces are at most a gap apart, in mean radii of a pair and radii at a wall."""
-    near = neighbor_pairs(packing, relative_gap=gap)
-    wall_particles, walls, _ = _wall_distances(packing, gap, 1.0)
-    return Neighbors(packing, near.pairs, near.shifts, wall_particles, walls)
-
-
-def closest_neighbors(packing: ParticlePacking, coordination: float) -> Neighbors:
-    """The closest pairs, as many as give a mean coordination number, as in `coordination_contacts`."""
-    wanted = round(0.5 * coordination * packing.count) if np.isfinite(coordination) else 0
-    if wanted < 1:
-        raise InputError(f"the mean coordination number must be positive (at least one contact), found {coordination}")
-    for reach in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0):
-        near = neighbor_pairs(packing, relative_gap=reach)
-        if near.count >= wanted:
-            relative = near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))
-            gap = float(np.partition(relative, wanted - 1)[wanted - 1])
-            return find_neighbors(packing, max(gap, 0.0) * (1.0 + 1e-12))
-    raise InputError(
-        f"a mean coordination number of {coordination:g} is out of reach: only {near.count} pairs of "
-        f"{packing.count} particles are closer than two mean radii, {wanted} are needed"
-    )
-
-
 @dataclass(frozen=True)
 class Rule:
     """A contact rule by its word.
@@ -205,10 +173,15 @@ class Rule:
     dimensions: tuple[int, ...] = (2, 3)
 
 
+ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", "wall_youngs_modulus", "wall_poisson_ratio")}
+"""Elastic constants of the particles and of the walls, as a study and as a rule spells them."""
+
 RULES: Mapping[str, Rule] = {
     "overlap": Rule(overlap_contacts, {}),
     "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
+    "hertz": Rule(hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}),
+    "load": Rule(load_contacts, {"load": "load", **ELASTIC, "bond_gap": "bond_gap", "coordination": "coordination"}),
 }
 
 
@@ -230,10 +203,10 @@ def _bonded(near: Neighbors, half_angle: float, rule: str) -> ContactNetwork:
     check_half_angle(half_angle)
     links = near.pairs, near.shifts, np.full(near.pairs.shape, float(half_angle))
     at_walls = near.wall_particles, near.walls, np.full(near.walls.size, float(half_angle))
-    return _without_resistance(near.packing, links, at_walls, rule)
+    return perfect_contacts(near.packing, links, at_walls, rule)
 
 
-def _without_resistance(
+def perfect_contacts(
     packing: ParticlePacking,
     links: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
     at_walls: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
@@ -253,28 +226,3 @@ def _chord_angle(
     """
     versine = (other - (distance - radius)) * (other + (distance - radius)) / (2.0 * distance * radius)
     return 2.0 * np.arcsin(np.sqrt(np.clip(0.5 * versine, 0.0, 1.0)))
-
-
-def _wall_distances(
-    packing: ParticlePacking, gap: float, sign: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Particles whose gap to a wall is at most ``sign * gap`` radii: (particle, wall, distance), wall by wall."""
-    particles: list[NDArray[np.int64]] = []
-    walls: list[NDArray[np.int64]] = []
-    distances: list[NDArray[np.float64]] = []
-    for axis in range(packing.dimension):
-        if packing.box.periodic[axis]:
-            continue
-        for end, distance in enumerate(
-            (packing.centers[:, axis], packing.box.lengths[axis] - packing.centers[:, axis])
-        ):
-            rows = np.flatnonzero(distance - packing.radii <= sign * gap * packing.radii)
-            particles.append(rows)
-            walls.append(np.full(rows.size, 2 * axis + end))
-            distances.append(distance[rows])
-    empty = np.zeros(0, dtype=np.int64)
-    return (
-        np.concatenate([empty, *particles]),
-        np.concatenate([empty, *walls]),
-        np.concatenate([empty.astype(np.float64), *distances]),
-    )

@@ -11,18 +11,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
-from etc_engine.sweep.dataset import SWEPT
+from etc_engine.study.quantities import SWEPT, heading_of
 
 if TYPE_CHECKING:
     import xarray
-
-HEADINGS = {
-    "density": "density",
-    "contact_angle": "contact half-angle [°]",
-    "contrast": "contrast",
-    "method": "method",
-}
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1d2430; background: #fff;
@@ -104,8 +98,8 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     facts = {
         "packing": f"{study['packing']['method']}, {study['packing']['radii']}",
         "box [m]": f"{box}, {study['packing']['periodic'] or 'not'} periodic",
-        "contacts": study["contacts"]["rule"] if study.get("composite") is None else "none: a matrix",
-        "engine and method": f"{study['conduction']['engine']}, {study['conduction']['method']}",
+        "contacts": study["contacts"].get("rule", "none: the whole cell is solved"),
+        "engine and method": f"{study['conduction']['engine']}, {_words(study['conduction']['method'])}",
         "particles of a realization": _number(float(particles.mean()), ".0f"),
         "realizations of a cell": _range(dataset["count"].values.ravel().tolist()),
         "failed cells": str(failed),
@@ -162,17 +156,15 @@ def _models(comparison: xarray.Dataset) -> str:
     titles = dict(zip(names, comparison["model_title"].values.tolist(), strict=True))
     notes = dict(zip(names, comparison["model_note"].values.tolist(), strict=True))
     shown = [n for n in names if not notes[n].startswith("is 0")]
-    pores, particles = comparison.attrs["pore_conductivity"], comparison.attrs["particle_conductivity"]
-    composite = bool(comparison.attrs["composite"])
-    conduct = ", ".join(f"{value:g}" for value in ([particles] if isinstance(particles, float) else particles))
-    around, bound = ("Matrix", "composites") if composite else ("Pores", "overlapping particles")
+    pores, particles = (in_words(comparison.attrs[f"{name}_conductivity"]) for name in ("pore", "particle"))
+    bound = "whole cells" if comparison.attrs["pores_conduct"] else "overlapping particles"
     binding = (
         f"The bounds bind {bound}: an asterisk is a result that breaks one."
         if comparison.attrs["bounds_bind"]
         else "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones: they are a comparison here."
     )
     text = (
-        f"<p>{around} of {pores:g} W/(m K), particles of {conduct} W/(m K), at the mean solid fraction. "
+        f"<p>Pores of {pores} W/(m K), particles of {particles} W/(m K), at the mean solid fraction. "
         f"Each model: conductivity in W/(m K), and relative difference to the simulation. {binding}</p>"
     )
     head = [*_labels(comparison), "simulation", *(titles[name] for name in shown)]
@@ -199,7 +191,7 @@ def _fits(fits: Sequence[Mapping[str, Any]]) -> str:
     rows = [
         [
             fit["model"],
-            ", ".join(f"{HEADINGS[key]} {value}" for key, value in fit["selection"].items()) or "all",
+            ", ".join(f"{heading_of(key)} {value}" for key, value in fit["selection"].items()) or "all",
             str(fit["points"]),
             "; ".join("{name} {value:.4g} [{low:.4g}, {high:.4g}]".format(**p) for p in fit["parameters"]),
             _number(100.0 * fit["rms_relative_residual"], ".2f"),
@@ -293,8 +285,13 @@ def _cells(data: xarray.Dataset) -> list[dict[str, int]]:
     return [dict(zip(dims, index, strict=True)) for index in itertools.product(*ranges)]
 
 
+def _words(value: str | list[str]) -> str:
+    """One word, or several."""
+    return value if isinstance(value, str) else ", ".join(value)
+
+
 def _labels(data: xarray.Dataset) -> list[str]:
-    return [HEADINGS[dim] for dim in SWEPT if dim in data["conductivity_mean"].dims]
+    return [heading_of(dim) for dim in SWEPT if dim in data["conductivity_mean"].dims]
 
 
 def _values(data: xarray.Dataset, index: Mapping[str, int]) -> list[str]:

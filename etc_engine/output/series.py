@@ -82,7 +82,7 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
         attrs={
             "Conventions": "CF-1.11",
             "title": f"{study.name}: transient heat conduction through a contact network",
-            "source": f"etc_engine {engine_version()}, method {study.conduction.method}",
+            "source": f"etc_engine {engine_version()}, engine {study.conduction.engine}",
             "history": f"{now()} {command_line()}",
             "command": command_line(),
             "commit": engine_commit(),
@@ -90,6 +90,7 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
             "study": text,
             "study_resolved": json.dumps(study.resolved()),
             "study_digest": study.digest(),
+            "engine": study.conduction.engine,
             "method": study.conduction.method,
             "scheme": study.time.scheme,
             "box": list(packing.box.lengths),
@@ -145,7 +146,7 @@ def _changes(transient: Transient) -> dict[str, tuple[Any, Any, str, str]]:
 def particle_capacities(transient: Transient) -> NDArray[np.float64]:
     """Heat capacity of each particle, shape (n,) [J/(m K)]; of moving ones that of the whole disk."""
     if transient.trajectory is not None:
-        rho_c = np.asarray(transient.study.material.heat_capacity, dtype=np.float64)
+        rho_c = np.asarray(transient.study.particles.heat_capacity, dtype=np.float64)
         return np.asarray(transient.network.packing.measures * rho_c)
     return transient.system.capacities
 

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from etc_engine.box import AXES
-from etc_engine.engines.dtem import conductivity as dtem
-from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem import families as dtem
 from etc_engine.engines.dtem.methods import dimensions_of
-from etc_engine.engines.dtem.transient import element_system
 from etc_engine.engines.lattice import homogenize as lattice
 from etc_engine.engines.pipe import steady as pipe
 from etc_engine.engines.pipe.field import pipe_field
@@ -25,7 +23,20 @@ from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.transient import ParticleSystem
-from etc_engine.realization.options import ANGLE_CURVE, BOUNDARY, DIPOLES, GREEN, MODES, Option, whole_number, word_of
+from etc_engine.realization.options import (
+    ANGLE_CURVE,
+    BOUNDARY,
+    BOUNDS,
+    DEGREE,
+    DIPOLES,
+    ERROR_ESTIMATE,
+    GREEN,
+    MATERIAL_CURVE,
+    MODES,
+    Option,
+    whole_number,
+    word_of,
+)
 from etc_engine.realization.outcome import Outcome, outcome_of
 
 NO, MAY, MUST = "no", "may", "must"
@@ -52,6 +63,8 @@ class Method:
         Whether it has a transient form.
     options : tuple of str
         Options of the engine that it heeds.
+    gas : bool
+        Whether it takes rarefied gas and radiation between the particles.
     """
 
     description: str
@@ -60,6 +73,7 @@ class Method:
     pores: str = NO
     transient: bool = False
     options: tuple[str, ...] = ()
+    gas: bool = False
 
 
 @dataclass(frozen=True)
@@ -105,8 +119,8 @@ class Engine:
 
     @property
     def needs_contacts(self) -> bool:
-        """Whether its methods work on a contact network; otherwise they resolve the pores."""
-        return all(method.contacts for method in self.methods.values())
+        """Whether its methods heed a contact network; otherwise they resolve the pores alone."""
+        return any(method.contacts for method in self.methods.values())
 
     def default_method(self, dimension: int, pores_conduct: bool) -> str:
         """The first method that works in a dimension and with pores that conduct or do not.
@@ -171,6 +185,13 @@ class Engine:
             able = [name for name, other in self.methods.items() if other.pores != NO]
             cure = f"use {' or '.join(able)}" if able else "use another engine, or pores that do not conduct"
             raise InputError(f"method {method} of engine {self.name} takes no heat through the pores: {cure}")
+        if not row.gas and not medium.pores.plain:
+            able = [name for name, other in self.methods.items() if other.gas]
+            cure = f"use {' or '.join(able)}" if able else "use another engine, or a continuum without radiation"
+            raise InputError(
+                f"method {method} of engine {self.name} takes neither the temperature jumps of a rarefied gas nor "
+                f"radiation: {cure}"
+            )
         if row.pores == MUST and not medium.pores.conduct:
             raise InputError(f"method {method} of engine {self.name} is only valid with pores that conduct")
 
@@ -260,12 +281,36 @@ ENGINES: Mapping[str, Engine] = {
                     dimensions_of("exact"),
                     options=("modes",),
                 ),
+                "cell": Method(
+                    "Laguerre cells: disks and the fluid between them",
+                    (2,),
+                    pores=MUST,
+                    transient=True,
+                    options=("degree", "error_estimate", "bounds"),
+                ),
+                "facets": Method(
+                    "facet links: spheres and the fluid between them, one link per Laguerre facet",
+                    (3,),
+                    contacts=False,
+                    pores=MUST,
+                    transient=True,
+                    options=("dipoles", "material_curve"),
+                    gas=True,
+                ),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
-            {"modes": MODES, "angle_curve": ANGLE_CURVE, "dipoles": DIPOLES},
-            system=element_system,
-            recover=lambda _, __, solution, load: recover_field(solution, load),
-            remarks=dtem.accuracy_remarks,
+            {
+                "modes": MODES,
+                "angle_curve": ANGLE_CURVE,
+                "dipoles": DIPOLES,
+                "material_curve": MATERIAL_CURVE,
+                "degree": DEGREE,
+                "error_estimate": ERROR_ESTIMATE,
+                "bounds": BOUNDS,
+            },
+            system=dtem.system_of,
+            recover=dtem.field_of,
+            remarks=dtem.remarks_on,
         ),
         Engine(
             "pipe",

@@ -1,8 +1,8 @@
-"""What a realization leaves behind: a cell for every contact angle (or contrast) and method."""
+"""What a realization leaves behind: one outcome per medium and method."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -13,7 +13,6 @@ from etc_engine.medium.conductances import mean_field_conductivity
 from etc_engine.medium.conduction import Result
 from etc_engine.medium.medium import Medium
 from etc_engine.packing.neighbors import neighbor_pairs
-from etc_engine.realization.specification import RealizationSpec
 
 
 class Status(IntEnum):
@@ -31,9 +30,9 @@ class Status(IntEnum):
 class Outcome:
     """What solving one medium by one method came to.
 
-    ``conductivity`` has shape (d, d) [W/(m K)]; components a walled box does not define are NaN.
+    ``conductivity`` has shape (d, d) [W/(m K)], None after a failure; components a walled box does not define are NaN.
     ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``model_error_estimate`` is
-    what the method is estimated to miss, where it tells: ``chord`` solved in full, ``exact`` by its bounds.
+    what the method is estimated to miss, where it has an estimate: ``chord`` solved in full, ``exact`` by its bounds.
     ``solved_by`` is ``full``, or ``reduced`` where the conductivity comes from the solutions at other
     contact angles, ``snapshots`` of them. ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each
     axis, of method ``exact`` only.
@@ -41,7 +40,7 @@ class Outcome:
 
     status: Status
     message: str = ""
-    conductivity: NDArray[np.float64] = field(default_factory=lambda: np.full((2, 2), np.nan))
+    conductivity: NDArray[np.float64] | None = None
     contacts: int = 0
     wall_contacts: int = 0
     coordination: float = np.nan
@@ -56,18 +55,15 @@ class Outcome:
     conductivity_bounds: tuple[tuple[float, float], ...] = ()
 
 
-Cells = tuple[tuple[Outcome, ...], ...]
-
-
 @dataclass(frozen=True)
 class Realization:
-    """What one realization gave; ``cells[variant][method]`` in the order of the specification."""
+    """What one realization gave; ``cells`` in the order of the specification, methods running fastest."""
 
     particles: int
     density: float
     solid_fraction: float
     pack_seconds: float
-    cells: Cells
+    cells: tuple[Outcome, ...]
 
 
 TOUCHING = 1e-6
@@ -76,11 +72,10 @@ TOUCHING = 1e-6
 
 def outcome_of(medium: Medium, result: Result) -> Outcome:
     """The outcome of a medium: its conductivity and its contacts, or the error as status and message."""
-    nowhere = np.full((medium.dimension, medium.dimension), np.nan)
     if isinstance(result, ConvergenceError):
-        return Outcome(Status.NOT_CONVERGED, str(result), nowhere)
+        return Outcome(Status.NOT_CONVERGED, str(result))
     if isinstance(result, EtcError):
-        return Outcome(Status.ERROR, str(result), nowhere)
+        return Outcome(Status.ERROR, str(result))
     missing, network = result.missing_axes, medium.network
     contacts = neighbor_pairs(medium.packing, relative_gap=TOUCHING).count if network is None else network.count
     return Outcome(
@@ -100,8 +95,3 @@ def outcome_of(medium: Medium, result: Result) -> Outcome:
         snapshots=result.snapshots,
         conductivity_bounds=() if result.bounds is None else tuple((float(k), float(m)) for k, m in result.bounds),
     )
-
-
-def uniform_cells(spec: RealizationSpec, cell: Outcome) -> Cells:
-    """The same outcome in every cell of a realization."""
-    return ((cell,) * len(spec.conduction.methods),) * spec.variants

@@ -2,126 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from etc_engine.medium.conduction import Conduction
 from etc_engine.packing import PackingSpec
 
 
 @dataclass(frozen=True)
-class ContactSpec:
-    """Which pairs conduct, and through how wide an arc.
-
-    Parameters
-    ----------
-    rule : str
-        ``overlap``, ``bonded`` or ``coordination``.
-    contact_angles : tuple of float [rad]
-        Half-angles of prescribed contacts, one cell each; empty with ``overlap``, where geometry sets them.
-    bond_gap : float
-        Largest bonded gap, in mean radii of the pair.
-    coordination : float, optional
-        Mean coordination number wanted by the ``coordination`` rule.
-    """
-
-    rule: str = "overlap"
-    contact_angles: tuple[float, ...] = ()
-    bond_gap: float = 1e-6
-    coordination: float | None = None
-
-
-@dataclass(frozen=True)
-class Mixture:
-    """A second material, given to randomly chosen particles.
-
-    Parameters
-    ----------
-    conductivity : float [W/(m K)]
-        Its conductivity.
-    fraction : float
-        Its number fraction, met to the nearest particle.
-    """
-
-    conductivity: float
-    fraction: float
-
-
-@dataclass(frozen=True)
-class ConductionSpec:
-    """How the heat conduction through a contact network is solved.
-
-    Parameters
-    ----------
-    engine : str
-        A word of the engine table.
-    methods : tuple of str
-        Variants of the engine, one cell each.
-    conductivity : float [W/(m K)]
-        Conductivity of the particles.
-    contact_resistance : float [m K/W]
-        Total resistance of a contact per unit thickness.
-    mixture : Mixture, optional
-        A second material for part of the particles.
-    tolerance : float
-        Relative error of the conductivity left by the iterative solver.
-    angle_curve : str
-        ``reduced`` solves many prescribed half-angles of one packing together, by a reduced basis, to an estimated
-        relative error of ``min(1e-8, 100 tolerance)`` at most; ``full`` solves each alone.
-    """
-
-    engine: str = "dtem"
-    methods: tuple[str, ...] = ("chord",)
-    conductivity: float = 1.0
-    contact_resistance: float = 0.0
-    mixture: Mixture | None = None
-    tolerance: float = 1e-10
-    angle_curve: str = "reduced"
-
-
-@dataclass(frozen=True)
-class CompositeSpec:
-    """The matrix that holds the particles, for the engines that solve the whole medium.
-
-    Parameters
-    ----------
-    matrix_conductivity : float [W/(m K)]
-        Conductivity of the matrix.
-    contrasts : tuple of float
-        Conductivity of the particles over that of the matrix, one cell each; empty where ``ConductionSpec`` gives it.
-    resolution : int
-        Voxels along the shortest edge of the box, for the engine ``voxel``.
-    nodes : int
-        Particles of the lattice, about, for the engine ``lattice``.
-    """
-
-    matrix_conductivity: float
-    contrasts: tuple[float, ...] = ()
-    resolution: int = 64
-    nodes: int = 10_000
-
-
-@dataclass(frozen=True)
 class RealizationSpec:
-    """Everything that defines one realization but its random stream; ``composite`` where a matrix conducts too."""
+    """What is packed, and every medium that is made of the packing and solved.
+
+    Parameters
+    ----------
+    packing : PackingSpec
+    rule : str
+        Contact rule, a word of `etc_engine.medium.rules.RULES`.
+    conduction : tuple of Conduction
+        One per method.
+    values : mapping of str to float
+        Physical values in SI units (angles in radians), by the names of `etc_engine.study.quantities.QUANTITIES`.
+    axes : mapping of str to tuple of float
+        Those of which there are several; each combination is a medium, the last axis running fastest.
+    """
 
     packing: PackingSpec
-    contacts: ContactSpec
-    conduction: ConductionSpec
-    composite: CompositeSpec | None = None
+    rule: str = "overlap"
+    conduction: tuple[Conduction, ...] = (Conduction(),)
+    values: Mapping[str, float] = field(default_factory=dict)
+    axes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
-    def variants(self) -> int:
-        """Cells of a method: contact half-angles, or contrasts."""
-        swept = self.contacts.contact_angles if self.composite is None else self.composite.contrasts
-        return max(len(swept), 1)
+    def shape(self) -> tuple[int, ...]:
+        """Cells of a realization: along each axis, and methods."""
+        return (*(len(values) for values in self.axes.values()), len(self.conduction))
 
-
-def particle_conductivities(count: int, conduction: ConductionSpec, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Conductivity of each particle, shape (count,) [W/(m K)]; a mixture's second material at random places."""
-    conductivities = np.full(count, conduction.conductivity)
-    if conduction.mixture is not None:
-        chosen = rng.permutation(count)[: round(conduction.mixture.fraction * count)]
-        conductivities[chosen] = conduction.mixture.conductivity
-    return conductivities
+    def combinations(self) -> Iterator[dict[str, float]]:
+        """The physical values of each medium."""
+        for values in itertools.product(*self.axes.values()):
+            yield {**self.values, **dict(zip(self.axes, values, strict=True))}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -14,6 +13,7 @@ from pydantic import BaseModel
 
 from etc_engine.errors import StudyError
 from etc_engine.packing import parse_radii
+from etc_engine.realization import ENGINES
 from etc_engine.service.settings import Limits
 from etc_engine.study.sweep import Study, parse_study
 
@@ -21,8 +21,8 @@ SOURCE = "study"
 FULL = 1.0
 """A density no packing without a count is expected to exceed."""
 
-BASE_BYTES, PARTICLE_BYTES, VOXEL_BYTES, NODE_BYTES = 250e6, 1600.0, 300.0, 3000.0
-"""Memory of a rank: of its libraries, of a particle, a voxel, a node of a lattice (measured, and rounded upwards)."""
+BASE_BYTES = 250e6
+"""Memory of a rank for its libraries, measured and rounded upwards."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,12 @@ def apply(text: str, limits: Limits) -> Application:
 
     Examples
     --------
-    >>> apply('schema = 1', Limits())
+    >>> apply('schema = 2', Limits())
     Traceback (most recent call last):
     etc_engine.errors.StudyError: study: name: missing, expected a name ... (and 3 more problems)
     """
     try:
-        study = parse_study(text, SOURCE)
-        if tomllib.loads(text)["schema"] is True:  # which Python takes for 1
-            raise StudyError(f"{SOURCE}: schema: found true, allowed: 1")
-        found = _measure(study, text)
+        found = _measure(parse_study(text, SOURCE), text)
     except (RecursionError, ArithmeticError) as error:  # a thousand brackets; radii of 1e300
         what = "is nested too deeply" if isinstance(error, RecursionError) else "has numbers out of range"
         raise StudyError(f"{SOURCE}: {what}") from None
@@ -88,7 +85,7 @@ def _measure(study: Study, text: str) -> Application:
         id=study_id(study),
         units=densities * study.statistics.realizations,
         most=most,
-        cells=most * len(study.variants[1] or (None,)) * len(study.conduction.methods),
+        cells=most * math.prod(study.shape),
         particles=expected_particles(study),
     )
 
@@ -118,22 +115,17 @@ def _refuse_excess(found: Application, limits: Limits) -> None:
             raise StudyError(f"{SOURCE}: {field}: makes about {value:.6g} {what}, this service allows {limit}")
     memory, allowed = _expected_memory(found) / 1e6, limits.memory_bytes / 1e6
     if not memory <= allowed:
-        field = "packing.box" if found.study.composite is None else "composite"
+        field = "packing.box" if ENGINES[found.study.conduction.engine].needs_contacts else "conduction"
         raise StudyError(
             f"{SOURCE}: {field}: takes about {memory:.0f} MB of memory a rank, this service allows {allowed:.0f} MB"
         )
 
 
 def _expected_memory(found: Application) -> float:
-    """Bytes of a rank."""
-    study = found.study
-    packing = BASE_BYTES + PARTICLE_BYTES * found.particles
-    if study.composite is None:
-        return packing
-    if study.conduction.engine == "lattice":
-        return packing + NODE_BYTES * study.composite.nodes
-    lengths = study.packing.box
-    return packing + VOXEL_BYTES * math.prod(study.composite.resolution * length / min(lengths) for length in lengths)
+    """Bytes of a rank, the most that one of the methods takes."""
+    study, engine = found.study, ENGINES[found.study.conduction.engine]
+    options = [engine.resolve(one.method, one.options) for one in study.realization_spec(None).conduction]
+    return BASE_BYTES + max(engine.memory(study.packing.box, found.particles, one) for one in options)
 
 
 def field_of(message: str) -> str:
@@ -172,8 +164,8 @@ def toml_of(values: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> print(toml_of({"schema": 1, "packing": {"box": [1.0, 2.0], "count": None}}))
-    schema = 1
+    >>> print(toml_of({"schema": 2, "packing": {"box": [1.0, 2.0], "count": None}}))
+    schema = 2
     packing = { box = [1.0, 2.0] }
     """
     try:

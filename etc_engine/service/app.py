@@ -51,9 +51,11 @@ from etc_engine.service.refusals import (
 from etc_engine.service.running import Runner
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
+from etc_engine.study.sweep import study_schema
 
 PAGE = {
     "app.js": "text/javascript",
+    "form.js": "text/javascript",
     "figure.js": "text/javascript",
     "style.css": "text/css",
     "icon.svg": "image/svg+xml",
@@ -134,9 +136,14 @@ def about(request: Request) -> About:
         running=service.queue.count("running"),
         packing_methods=list(METHODS),
         size_distributions=list(SHOWN_WORDS),
-        conduction_methods={name: list(engine.methods) for name, engine in ENGINES.items()},
-        composite_engines=[name for name, engine in ENGINES.items() if not engine.needs_contacts],
+        engines={name: list(engine.methods) for name, engine in ENGINES.items() if engine.needs_contacts},
     )
+
+
+@api.get("/schema")
+def schema() -> dict[str, Any]:
+    """The JSON schema of a study: every key with its type, default and meaning, and an example."""
+    return study_schema()
 
 
 @api.get("/studies")
@@ -319,7 +326,7 @@ def front_page() -> Response:
 
 @page.head("/page/{name}")
 @page.get("/page/{name}")
-def page_file(name: Literal["app.js", "figure.js", "style.css", "icon.svg"]) -> Response:
+def page_file(name: Literal["app.js", "figure.js", "form.js", "style.css", "icon.svg"]) -> Response:
     """A part of the web page."""
     return Response(files(__package__).joinpath("page", name).read_bytes(), media_type=PAGE[name])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import InputError
+from etc_engine.study.quantities import word_of
 
 if TYPE_CHECKING:
     import xarray
@@ -27,10 +29,10 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``: ``contact_angle`` [degree],
-        ``contrast`` and ``method`` (None where the sweep has no such axis), ``mean``, ``low``, ``high`` [W/(m K)] and
-        ``count`` over the densities. ``models`` with their curves, ``remark`` where there are none,
-        ``bounds_broken``. A number that is not there is None.
+        ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``: ``values`` of the other dimensions of
+        the sweep, in words too as ``name``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities.
+        ``models`` with their curves, ``remark`` where there are none, ``bounds_broken``. A missing number
+        is None.
     """
     units = int((dataset["worker_rank"].values >= 0).sum())
     found: dict[str, Any] = {"units": units, "confidence": float(dataset.attrs["confidence_level"])}
@@ -40,7 +42,7 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
         return found
     statistics = simulated(dataset)
     found["solid_fraction"] = plain(_over_density(statistics["solid_fraction"]))
-    found["series"] = [_series(statistics.isel(place)) for place in _places(statistics)]
+    found["series"] = [_series(statistics.isel(place), place) for place in _places(statistics)]
     try:
         comparison = evaluate_models(dataset)
     except InputError as error:
@@ -59,10 +61,11 @@ def _places(statistics: xarray.Dataset) -> list[dict[str, int]]:
     return [dict(zip(names, place, strict=True)) for place in np.ndindex(*sizes)]
 
 
-def _series(cell: xarray.Dataset) -> dict[str, Any]:
-    axes = {name: cell.coords.get(name) for name in ("contact_angle", "contrast", "method")}
+def _series(cell: xarray.Dataset, names: Iterable[str]) -> dict[str, Any]:
+    values = {name: cell[name].values.item() for name in names}
     return {
-        **{name: None if value is None else value.values.item() for name, value in axes.items()},
+        "name": ", ".join(word_of(name, value) for name, value in values.items()),
+        "values": values,
         "mean": plain(cell["conductivity_mean"].values),
         "low": plain(cell["conductivity_ci_low"].values),
         "high": plain(cell["conductivity_ci_high"].values),
@@ -82,8 +85,8 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
         one = comparison.sel(model=name)
         value = one["model_conductivity"]
         if str(name) in drawn:
-            density, curves = lines["density"].values, np.atleast_2d(drawn[str(name)])
-        else:  # the contact mean field: values on the sweep only, a curve for every angle and method
+            density, curves = lines["density"].values, drawn[str(name)].reshape(-1, lines.sizes["density"])
+        else:  # the contact mean field: values on the sweep only, a curve per cell
             density = comparison["density"].values
             curves = np.array([_over_density(value.isel(place)) for place in _places(comparison)])
         squares = np.asarray(one["rms_relative_difference"].values, dtype=np.float64) ** 2
@@ -102,7 +105,7 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
 
 
 def _over_density(values: xarray.DataArray) -> NDArray[np.float64]:
-    """The first curve of an array that may have one for every angle and method."""
+    """The first curve of an array that may have several."""
     other = {name: 0 for name in values.dims if name != "density"}
     return np.asarray(values.isel(other).values, dtype=np.float64)
 

@@ -95,8 +95,7 @@ class About(BaseModel):
     running: int
     packing_methods: list[str]
     size_distributions: list[str]
-    conduction_methods: dict[str, list[str]] = Field(description="methods of each engine")
-    composite_engines: list[str] = Field(description="engines that solve the whole medium and take [composite]")
+    engines: dict[str, list[str]] = Field(description="engines of a single solve, and their methods")
 
 
 class Solved(BaseModel):

@@ -20,24 +20,17 @@ from etc_engine.service.admission import field_of, toml_of
 from etc_engine.service.client import IDENTITY
 from etc_engine.service.messages import Problem
 from etc_engine.service.running import BusyError, EngineError
+from etc_engine.study.sweep import EXAMPLE
 
 log = logging.getLogger("etc_engine.service")
 
-STUDY_EXAMPLE = {
-    "schema": 1,
-    "name": "example",
-    "seed": 20261,
-    "packing": {"radii": "uniform:0.01:0.02", "box": [1.0, 1.0], "density": [0.66, 0.72]},
-    "contacts": {"rule": "bonded", "contact_angle": [5.0]},
-    "statistics": {"realizations": 5},
-}
 STUDY_BODY = {
     "requestBody": {
         "required": True,
         "description": "a study, as TOML or as JSON of the same structure",
         "content": {
-            "application/toml": {"schema": {"type": "string"}, "example": toml_of(STUDY_EXAMPLE)},
-            "application/json": {"schema": {"type": "object"}, "example": STUDY_EXAMPLE},
+            "application/toml": {"schema": {"type": "string"}, "example": toml_of(EXAMPLE)},
+            "application/json": {"schema": {"type": "object"}, "example": EXAMPLE},
         },
     }
 }

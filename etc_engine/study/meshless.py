@@ -1,12 +1,13 @@
-"""Transient study files of kind "meshless": the schema, and the run from parsed TOML to a dataset."""
+"""The study file of a meshless transient, and the run from its content to a dataset."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, Tag, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from etc_engine.engines.meshless.contact_heating import ContactArc, heat_disk_through_arcs
 from etc_engine.engines.meshless.discretization import Discretization
@@ -15,50 +16,19 @@ from etc_engine.engines.meshless.problem import BoundaryCondition, Convective, D
 from etc_engine.engines.meshless.radial_basis import PolyharmonicSpline
 from etc_engine.engines.meshless.solve import solve_transient
 from etc_engine.errors import ConvergenceError, InputError, StudyError
+from etc_engine.medium import walls
+from etc_engine.medium.walls import FixedTemperature, HeatFlux, ValueLike, WallCondition, as_value
 from etc_engine.solvers.overflow import representable_numbers
-from etc_engine.study.schema import (
-    AS_NUMBER,
-    AS_TABLE,
-    MOST_STEPS,
-    NUMBER,
-    POSITIVE,
-    SMALLEST,
-    WRITTEN,
-    Number,
-    Positive,
-    StudyTable,
-    Times,
-    Word,
-    first_problem,
-)
+from etc_engine.study.files import StudyFile, validated
+from etc_engine.study.schema import MOST_STEPS, NUMBER, POSITIVE, SMALLEST, Number, Positive, StudyTable, Times
+from etc_engine.study.walls import A_VALUE, Value, Wall, plain
 
 if TYPE_CHECKING:
     import xarray
 
 Point = tuple[Number, Number]
 Count = Annotated[int, Field(strict=True, ge=1, le=10**6)]
-A_VALUE = f"{NUMBER}, or a table {{ times = [...], values = [...] }}"
 A_COUNT = "a whole number of at least 1"
-
-
-class TimeTable(StudyTable):
-    """Values at increasing times, linear in between and constant outside."""
-
-    times: Times = Field(min_length=2, description=f"at least two times [s], each {NUMBER}")
-    values: list[Number] = Field(min_length=2, description=f"at least two values, each {NUMBER}")
-
-    @model_validator(mode="after")
-    def _check(self) -> TimeTable:
-        if len(self.times) != len(self.values):
-            raise ValueError(f"a table needs as many values as times, found {len(self.values)} and {len(self.times)}")
-        return self
-
-    def at(self, t: float) -> float:
-        """The value at a time."""
-        return float(np.interp(t, self.times, self.values))
-
-
-Value = Annotated[Annotated[Number, Tag(AS_NUMBER)] | Annotated[TimeTable, Tag(AS_TABLE)], WRITTEN]
 
 
 class DiskShape(StudyTable):
@@ -78,26 +48,6 @@ class Body(StudyTable):
     heat_capacity: Positive = Field(description=f"{POSITIVE}, rho c [J/(m3 K)]")
     initial: Number = Field(description=f"{NUMBER} [K]")
     source: Value = Field(default=0.0, description=f"{A_VALUE} [W/m3]")
-
-
-class Edge(StudyTable):
-    """Boundary condition of one edge."""
-
-    type: Literal["dirichlet", "neumann", "convective"] = Field(description="dirichlet, neumann or convective")
-    value: Value = Field(
-        description=f"{A_VALUE}: temperature [K], heat flux into the body [W/m2] or ambient temperature [K]"
-    )
-    coefficient: Positive | None = Field(
-        default=None, description=f"{POSITIVE}, the heat transfer coefficient [W/(m2 K)]"
-    )
-
-    @model_validator(mode="after")
-    def _check(self) -> Edge:
-        if self.type == "convective" and self.coefficient is None:
-            raise ValueError("coefficient: missing, type = 'convective' needs one [W/(m2 K)]")
-        if self.type != "convective" and self.coefficient is not None:
-            raise ValueError(f"coefficient: has no meaning with type = {self.type!r}, take it out")
-        return self
 
 
 class Contact(StudyTable):
@@ -148,14 +98,12 @@ class Solver(StudyTable):
     source_offset: Positive | None = Field(default=None, description=POSITIVE)
 
 
-class MeshlessStudy(StudyTable):
+class MeshlessStudy(StudyFile):
     """A transient study of kind "meshless"."""
 
-    schema_version: Literal[1] = Field(alias="schema", description="1")
     kind: Literal["meshless"] = Field(description="meshless")
-    name: Word = Field(description="a name")
     body: Body = Field(description="a table of shape and material")
-    boundary: list[Edge] = Field(default=[], description="tables [[boundary]], one for each edge")
+    boundary: list[Wall] = Field(default=[], description="tables [[boundary]], one for each edge")
     contact: list[Contact] = Field(default=[], description="tables [[contact]], one for each arc")
     output: Output = Field(description="a table with times, and points or a grid")
     solver: Solver = Solver()
@@ -167,7 +115,7 @@ class MeshlessStudy(StudyTable):
         if not self.output.points and self.output.grid is None:
             raise ValueError("[output] needs points or a grid")
         if self.contact and (self.body.disk is None or self.boundary):
-            raise ValueError("[[contact]] goes with a disk, and instead of [[boundary]]")
+            raise ValueError("[[contact]] is only valid with a disk, and replaces [[boundary]]")
         if self.contact and self.body.disk is not None and (self.body.disk.breaks or any(self.body.disk.center)):
             raise ValueError("a disk with [[contact]] sits at the origin and has no breaks")
         if self.contact and (self.solver.method != "trefftz" or self.body.source != 0.0):
@@ -175,28 +123,16 @@ class MeshlessStudy(StudyTable):
         return self
 
 
-def parse_study(content: Mapping[str, Any]) -> MeshlessStudy:
-    """The study of a parsed TOML file.
-
-    Raises
-    ------
-    StudyError
-        If it does not follow the schema; the message names the first offending entry.
-    """
-    try:
-        return MeshlessStudy.model_validate(dict(content))
-    except ValidationError as error:
-        raise StudyError(first_problem(error, MeshlessStudy)) from None
-
-
 @representable_numbers()
-def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
+def run_study(content: Mapping[str, Any], source: str = "study") -> xarray.Dataset:
     """Solve a study of kind "meshless".
 
     Parameters
     ----------
     content : mapping
-        The parsed TOML file.
+        Of the study file.
+    source : str
+        Its name, for errors.
 
     Returns
     -------
@@ -206,18 +142,20 @@ def run_study(content: Mapping[str, Any]) -> xarray.Dataset:
     Examples
     --------
     >>> result = run_study({
-    ...     "schema": 1, "kind": "meshless", "name": "quench",
+    ...     "schema": 2, "kind": "meshless", "name": "quench",
     ...     "body": {"disk": {"radius": 1.0}, "conductivity": 1.0, "heat_capacity": 1.0, "initial": 1.0},
-    ...     "boundary": [{"type": "dirichlet", "value": 0.0}],
+    ...     "boundary": [{"type": "fixed", "value": 0.0}],
     ...     "output": {"times": [0.1], "points": [[0.0, 0.0]]}, "solver": {"scheme": "laplace"}})
     >>> round(float(result.temperature[0, 0]), 5)
     0.84836
     """
-    study = parse_study(content)
+    study = validated(content, MeshlessStudy, source)
     result = _run_contacts(study) if study.contact else _run_body(study)
     if not np.isfinite(result.temperature.values).all():
         raise ConvergenceError("the temperatures are no longer finite: check the values of the study")
-    return result.assign_attrs(study=study.name)
+    return result.assign_attrs(
+        study=study.name, study_resolved=json.dumps(study.resolved()), study_digest=study.digest()
+    )
 
 
 def _run_body(study: MeshlessStudy) -> xarray.Dataset:
@@ -227,8 +165,8 @@ def _run_body(study: MeshlessStudy) -> xarray.Dataset:
         conductivity=study.body.conductivity,
         heat_capacity=study.body.heat_capacity,
         initial=study.body.initial,
-        source=_data(study.body.source),
-        boundary=[_condition(edge) for edge in study.boundary],
+        source=_data(plain(study.body.source)),
+        boundary=[_condition(edge.condition()) for edge in study.boundary],
     )
     solver = study.solver
     return solve_transient(
@@ -252,7 +190,7 @@ def _run_contacts(study: MeshlessStudy) -> xarray.Dataset:
     )
     return heat_disk_through_arcs(
         [ContactArc(np.radians(contact.angle), np.radians(contact.half_angle)) for contact in study.contact],
-        [contact.heat.at if isinstance(contact.heat, TimeTable) else contact.heat for contact in study.contact],
+        [plain(contact.heat) for contact in study.contact],
         study.output.times,
         radius=study.body.disk.radius,
         conductivity=study.body.conductivity,
@@ -285,21 +223,23 @@ def _disk(shape: DiskShape | None) -> Disk | None:
     return Disk(shape.center, shape.radius, tuple(np.radians(shape.breaks).tolist()))
 
 
-def _data(value: float | TimeTable) -> Data:
-    if not isinstance(value, TimeTable):
-        return value
-    table = value
-    history: Callable[[np.ndarray, float], float] = lambda _, t: table.at(t)  # noqa: E731
+def _data(value: ValueLike) -> Data:
+    """A number, or a function of position and time, as a problem takes it."""
+    at = as_value(value, "value")
+    if not callable(at):
+        return at
+    history: Callable[[np.ndarray, float], float] = lambda _, t: at(t)  # noqa: E731
     return history
 
 
-def _condition(edge: Edge) -> BoundaryCondition:
-    if edge.type == "dirichlet":
-        return Dirichlet(_data(edge.value))
-    if edge.type == "neumann":
-        return Neumann(_data(edge.value))
-    assert edge.coefficient is not None
-    return Convective(edge.coefficient, _data(edge.value))
+def _condition(wall: WallCondition) -> BoundaryCondition:
+    if isinstance(wall, FixedTemperature):
+        return Dirichlet(_data(wall.value))
+    if isinstance(wall, HeatFlux):
+        return Neumann(_data(wall.value))
+    if isinstance(wall, walls.Convective):
+        return Convective(wall.coefficient, _data(wall.ambient))
+    return Neumann(0.0)
 
 
 def _points(study: MeshlessStudy, problem: HeatProblem) -> np.ndarray:

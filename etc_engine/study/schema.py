@@ -1,4 +1,4 @@
-"""What all study files share: strict tables, bounded numbers, and the first mistake in words."""
+"""What all tables of study files share: strict keys, bounded numbers, and the first mistake in words."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from difflib import get_close_matches
 from itertools import pairwise
 from typing import Annotated, Any, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
 LARGEST, SMALLEST = 1e100, 1e-100
-"""No quantity in SI units is beyond; products of three of them still are numbers."""
+"""No quantity in SI units lies beyond these; products of three of them are still finite."""
 MOST_STEPS = 10**9
-"""A run of more steps than these, at a microsecond each and more, has a slip in its study."""
+"""A run of more steps than this has a mistake in its study: each takes a microsecond or more."""
 
 NUMBER = "a number of at most 1e100 in size"
 POSITIVE = "a positive number from 1e-100 to 1e100"
@@ -31,6 +31,14 @@ class StudyTable(BaseModel):
     """A table of a study file. The description of a field says what is allowed, for the error line."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def without_repeats(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The values, refused if one stands twice."""
+    repeated = [value for value in dict.fromkeys(values) if values.count(value) > 1]
+    if repeated:
+        raise ValueError(f"{repeated[0]!r} is listed twice, each value may stand once")
+    return values
 
 
 def _increasing(times: list[float]) -> list[float]:
@@ -53,7 +61,7 @@ def _written(value: object) -> str:
 
 
 WRITTEN = Discriminator(_written)
-"""Chooses what a value may be by how it is written, so that a mistake in a table is told as one in a table."""
+"""Chooses what a value may be by how it is written, so that a mistake inside a table is reported as one."""
 
 
 def first_problem(error: ValidationError, root: type[BaseModel], hints: Mapping[str, str] | None = None) -> str:
@@ -65,7 +73,7 @@ def first_problem(error: ValidationError, root: type[BaseModel], hints: Mapping[
     root : type of BaseModel
         Of the whole study.
     hints : mapping of str to str, optional
-        What to say of an unknown key, by its place.
+        What to write instead of a key that has moved, by its place.
 
     Examples
     --------
@@ -87,7 +95,7 @@ def _describe(detail: ErrorDetails, root: type[BaseModel], hints: Mapping[str, s
     key, table, allowed = _field(root, detail["loc"])
     if detail["type"] == "extra_forbidden":
         if key in hints:
-            return f"{key}: unknown key, {hints[key]}"
+            return f"{key}: unknown key, write {hints[key]}"
         names = [field.alias or name for name, field in table.model_fields.items()]
         near = get_close_matches(str(detail["loc"][-1]), names, 1)
         hint = f", did you mean {near[0]!r}?" if near else ","
@@ -118,9 +126,13 @@ def _field(root: type[BaseModel], location: Sequence[int | str]) -> tuple[str, t
         if isinstance(step, int):
             place += f"[{step}]"
             continue
+        arm = _tagged(inside, step)
+        if arm is not None:  # which of the ways to write a value, no key
+            inside = arm
+            continue
         inner = _table_in(inside)
-        if inner is None or step in (AS_NUMBER, AS_LIST, AS_TABLE):
-            continue  # no key: which of the ways to write a value
+        if inner is None:
+            continue
         table = inner
         place += f".{step}" if place else step
         field = next((f for n, f in table.model_fields.items() if step in (n, f.alias)), None)
@@ -129,6 +141,16 @@ def _field(root: type[BaseModel], location: Sequence[int | str]) -> tuple[str, t
         allowed = field.description or "a table"
         inside = field.annotation
     return place, table, allowed
+
+
+def _tagged(annotation: Any, tag: str) -> Any:
+    """The way to write a value that has a tag, or None."""
+    for way in get_args(annotation):
+        if any(isinstance(mark, Tag) and mark.tag == tag for mark in get_args(way)):
+            return way
+        if (inner := _tagged(way, tag)) is not None:
+            return inner
+    return None
 
 
 def _table_in(annotation: Any) -> type[BaseModel] | None:

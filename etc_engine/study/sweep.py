@@ -1,28 +1,29 @@
-"""The study file: what a sweep is made of, read from TOML and checked before anything runs."""
+"""The study file of a sweep: read from TOML and checked before anything runs."""
 
 from __future__ import annotations
 
-import hashlib
-import json
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from etc_engine.box import Box, parse_periodic
 from etc_engine.engines.voxel.voxelization import check_memory, coarsest_resolution
-from etc_engine.errors import InputError, StudyError
-from etc_engine.packing import PackingSpec
-from etc_engine.realization import ENGINES, CompositeSpec, ConductionSpec, ContactSpec, Mixture, RealizationSpec
-from etc_engine.study.schema import StudyTable, Word, first_problem
+from etc_engine.errors import InputError
+from etc_engine.medium.rules import RULES
+from etc_engine.realization import ENGINES, Conduction, RealizationSpec
+from etc_engine.study.files import A_SEED, SCHEMA, Seed, StudyFile, parse_toml, read_text, validated
+from etc_engine.study.meaning import MEANING, OPTIONS, drop_meaningless, meaningless, refuse_meaningless
+from etc_engine.study.quantities import QUANTITIES, value_of
 from etc_engine.study.tables import (
-    CompositeTable,
     ConductionTable,
     ContactsTable,
     ModelsTable,
     PackingTable,
+    ParticlesTable,
+    PoresTable,
+    RadiationTable,
     StatisticsTable,
     distribution,
 )
@@ -33,96 +34,79 @@ NEARLY = 0.9
 DRAWN = ("uniform", "gaussian", "lognormal")
 """Distributions whose smallest radius depends on what is drawn."""
 
-HINTS = {"conduction.pipe_resistance": "engine = 'pipe' has method = 'chord' or 'uniform', the resistance of its pipes"}
-"""What to say of keys that other commands have."""
 
-LONGEST_NAME = 80
+class Study(StudyFile):
+    """A sweep: every list of physical values, and of methods, is a dimension; realizations are the last one."""
 
+    WITHOUT_EFFECT: ClassVar[tuple[str, ...]] = ("name", "models")
 
-def _printable(name: str) -> str:
-    """Names stand in tables and on terminals."""
-    if not (1 <= len(name) <= LONGEST_NAME and name.isprintable()):
-        shown = name if len(name) <= LONGEST_NAME else f"{name[:20]}... ({len(name)} characters)"
-        raise ValueError(f"found {shown!r}, allowed: 1 to {LONGEST_NAME} printable characters")
-    return name
-
-
-def _no_truth(value: object) -> object:
-    """``true`` equals 1 in Python, and is no number of a schema."""
-    return str(value).lower() if isinstance(value, bool) else value
-
-
-class Study(StudyTable):
-    """A sweep: densities x contact angles (or contrasts) x methods x realizations of one kind of packing."""
-
-    schema_: Annotated[Literal[1], BeforeValidator(_no_truth)] = Field(alias="schema", description="1")
-    name: Annotated[Word, AfterValidator(_printable)] = Field(description="a name of 1 to 80 printable characters")
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = Field(description="a whole number from 0 to 2**63 - 1")
+    seed: Seed = Field(description=A_SEED)
     packing: PackingTable = Field(description="a table")
+    particles: ParticlesTable = Field(default_factory=ParticlesTable, description="a table")
     contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
+    pores: PoresTable = Field(default_factory=PoresTable, description="a table")
+    radiation: RadiationTable = Field(default_factory=RadiationTable, description="a table")
     conduction: ConductionTable = Field(default_factory=ConductionTable, description="a table")
-    composite: CompositeTable | None = Field(default=None, description="a table")
     statistics: StatisticsTable = Field(description="a table")
     models: ModelsTable = Field(default_factory=ModelsTable, description="a table")
 
     @model_validator(mode="after")
     def _check(self) -> Study:
-        word, engine = self.conduction.engine, ENGINES[self.conduction.engine]
-        if len(self.packing.box) not in engine.dimensions:
-            works = " or ".join(f"{dimension}D" for dimension in engine.dimensions)
-            raise ValueError(f"packing.box: engine {word!r} works in {works}, found {list(self.packing.box)}")
+        dimension, engine = len(self.packing.box), ENGINES[self.conduction.engine]
+        for method in self.methods:
+            row = engine.methods[method]
+            if dimension not in row.dimensions:
+                works = " and ".join(f"{d}D" for d in row.dimensions)
+                raise ValueError(
+                    f"packing.box: method {method!r} of engine {engine.name!r} works in {works}, found "
+                    f"{list(self.packing.box)}"
+                )
+            self._check_pores(method, row.pores)
+        if dimension not in RULES[self.contacts.rule].dimensions:
+            raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
+        refuse_meaningless(self)
         if not engine.needs_contacts:
-            self._check_composite()
-        elif self.composite is not None:
-            raise ValueError(f"composite: has no meaning with engine = {word!r}, which conducts through contacts alone")
-        if self.contacts.rule == "bonded" and max(self.packing.density or (0.0,)) >= 1.0:
+            self._check_cell()
+        densest = max((density for density in self.densities if density is not None), default=0.0)
+        if self.contacts.rule == "bonded" and densest >= 1.0:
             raise ValueError(
-                f"packing.density: found {max(self.packing.density or ())}, allowed below 1 "
-                "with rule = 'bonded', whose disks do not overlap"
+                f"packing.density: found {densest}, allowed below 1 with rule = 'bonded': its particles do not overlap"
             )
         return self
 
-    def _check_composite(self) -> None:
-        """A matrix, walls or no walls, and nothing that is about contacts."""
-        word, composite = self.conduction.engine, self.composite
-        if composite is None:
-            raise ValueError(f"composite: missing, engine = {word!r} needs a table with matrix_conductivity")
-        if self.contacts != ContactsTable():
-            raise ValueError(f"contacts: has no meaning with engine = {word!r}, which solves the whole medium")
-        if self.conduction.contact_resistance != 0.0:
-            raise ValueError(f"conduction.contact_resistance: has no meaning with engine = {word!r}")
-        if composite.contrast is not None and "conductivity" in self.conduction.model_fields_set:
-            raise ValueError("conduction.conductivity: composite.contrast gives that of the particles, take one out")
-        if composite.contrast is not None and self.conduction.mixture is not None:
-            raise ValueError("conduction.mixture: has no meaning with composite.contrast, take one out")
+    def _check_pores(self, method: str, pores: str) -> None:
+        """Refuse pores that conduct with a method that leaves their heat out, and the reverse."""
+        values, which = self.values("pore_conductivity"), f"method {method!r} of engine {self.conduction.engine!r}"
+        if pores == "no" and max(values) > 0.0:
+            raise ValueError(
+                f"pores.conductivity: found {max(values):g}, {which} takes no heat through them: allowed is 0"
+            )
+        if pores == "must" and min(values) <= 0.0:
+            raise ValueError(
+                f"pores.conductivity: found {min(values):g}, {which} is only valid with pores that conduct"
+            )
+
+    def _check_cell(self) -> None:
+        """The box and the grid of an engine that solves the whole cell."""
+        word = self.conduction.engine
         if self.packing.periodic and len(self.packing.periodic) < len(self.packing.box):
             raise ValueError(
                 f"packing.periodic: found {self.packing.periodic!r}, engine = {word!r} takes a box with walls all "
                 "around or with none"
             )
-        self._check_grid(composite)
-        if "pore_conductivity" in self.models.model_fields_set:
-            raise ValueError("models.pore_conductivity: composite.matrix_conductivity says it, take it out")
-
-    def _check_grid(self, composite: CompositeTable) -> None:
-        """The grid goes with its engine, and with the particles where their size is known beforehand."""
-        word = self.conduction.engine
-        foreign = "nodes" if word == "voxel" else "resolution"
-        if foreign in composite.model_fields_set:
-            raise ValueError(f"composite.{foreign}: has no meaning with engine = {word!r}, take it out")
         if word != "voxel":
             return
         try:
-            check_memory(self.packing.box, composite.resolution)
+            check_memory(self.packing.box, self.conduction.resolution)
         except InputError as error:
-            raise ValueError(f"composite.resolution: {error}") from None
+            raise ValueError(f"conduction.resolution: {error}") from None
         radius = self._smallest_radius()
         if radius is None:
             return
         needed = coarsest_resolution(self.packing.box, radius)
-        if composite.resolution < NEARLY * needed:
+        if self.conduction.resolution < NEARLY * needed:
             raise ValueError(
-                f"composite.resolution: found {composite.resolution}, too coarse for the smallest particle, of "
+                f"conduction.resolution: found {self.conduction.resolution}, too coarse for the smallest particle, of "
                 f"diameter {2.0 * radius:.6g}: allowed is at least {needed}"
             )
 
@@ -130,25 +114,56 @@ class Study(StudyTable):
         """Least radius of the sweep where it does not depend on what is drawn, or None."""
         packing = self.packing
         radii = distribution(packing.radii)
-        if packing.count is None or packing.density is None:
+        if packing.count is None or self.densities == (None,):
             return None if radii.scalable or radii.kind in DRAWN else radii.smallest
         if radii.kind != "equal":
             return None
         dimension = len(packing.box)
-        measure = min(packing.density) * float(np.prod(packing.box)) / packing.count
+        measure = min(d for d in self.densities if d is not None) * float(np.prod(packing.box)) / packing.count
         return float((measure / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension))
 
     @property
-    def variants(self) -> tuple[str, tuple[float, ...] | None]:
-        """The second axis of the sweep: its name, and its values (None: there is one cell, and no axis)."""
-        if self.composite is None:
-            return "contact_angle", self.contacts.contact_angle
-        return "contrast", self.composite.contrast
+    def methods(self) -> tuple[str, ...]:
+        """The methods as a list, one or many."""
+        method = self.conduction.method
+        if method is None:
+            engine, conduct = ENGINES[self.conduction.engine], max(self.values("pore_conductivity")) > 0.0
+            try:
+                return (engine.default_method(len(self.packing.box), conduct),)
+            except InputError:  # none fits: the checks say what is wrong with the first
+                return (next(iter(engine.methods)),)
+        return (method,) if isinstance(method, str) else method
+
+    def values(self, name: str) -> tuple[float, ...]:
+        """Values of a quantity, one or several; none where the study does not give any."""
+        found = value_of(self, QUANTITIES[name])
+        return () if found is None else found if isinstance(found, tuple) else (found,)
 
     @property
     def densities(self) -> tuple[float | None, ...]:
         """The densities of the sweep; None alone stands for the packer's own."""
-        return self.packing.density or (None,)
+        return self.values("density") or (None,)
+
+    @property
+    def quantities(self) -> dict[str, tuple[float, ...]]:
+        """Values of what has a meaning on a packing, in the order of the dimensions; one, or several."""
+        without = {place for place, _ in meaningless(self)}
+        rows = {name: row for name, row in QUANTITIES.items() if row.changes != "packing" and row.place not in without}
+        return {name: found for name in rows if (found := self.values(name))}
+
+    @property
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """What is varied on each packing: the quantities with a list, in the order of the dimensions."""
+        return {
+            name: values
+            for name, values in self.quantities.items()
+            if isinstance(value_of(self, QUANTITIES[name]), tuple)
+        }
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Cells of a packing: along each axis, and methods."""
+        return (*(len(values) for values in self.axes.values()), len(self.methods))
 
     @property
     def box(self) -> Box:
@@ -161,67 +176,31 @@ class Study(StudyTable):
 
         It is a study again, the same one.
         """
-        values = self.model_dump(mode="json", by_alias=True)
-        if self.composite is not None:
-            del values["contacts"]
-            del values["models"]["pore_conductivity"]
-            del values["composite"]["nodes" if self.conduction.engine == "voxel" else "resolution"]
-            if self.composite.contrast is not None:
-                del values["conduction"]["conductivity"]
-        return values
-
-    def identity(self) -> dict[str, Any]:
-        """What decides the numbers of the result: everything but the name and the models."""
-        resolved = self.resolved()
-        if self.composite is None:
-            del resolved["composite"]
-        return {key: value for key, value in resolved.items() if key not in ("name", "models")}
-
-    def digest(self) -> str:
-        """SHA-256 of the identity: two studies with the same digest give the same bits."""
-        return hashlib.sha256(json.dumps(self.identity(), sort_keys=True).encode()).hexdigest()
+        values = super().resolved()
+        values["conduction"]["method"] = self.conduction.method or self.methods[0]
+        return drop_meaningless(self, values)
 
     def realization_spec(self, density: float | None) -> RealizationSpec:
         """The specification of one realization at a density of this study (None: the packer's own)."""
-        packing, contacts, conduction = self.packing, self.contacts, self.conduction
-        mixture = conduction.mixture
+        rows, engine = QUANTITIES, ENGINES[self.conduction.engine]
+        si = {name: tuple(value * rows[name].si for value in values) for name, values in self.quantities.items()}
         return RealizationSpec(
-            packing=PackingSpec(
-                method=packing.method,
-                radii=distribution(packing.radii),
-                box=self.box,
-                count=packing.count,
-                density=density,
-                growth_rate=packing.growth_rate,
-                radius_growth=contacts.rule == "overlap" and self.composite is None,
-            ),
-            contacts=ContactSpec(
-                rule=contacts.rule,
-                contact_angles=tuple(float(np.deg2rad(angle)) for angle in contacts.contact_angle or ()),
-                bond_gap=contacts.bond_gap,
-                coordination=contacts.coordination,
-            ),
-            conduction=ConductionSpec(
-                engine=conduction.engine,
-                methods=conduction.methods,
-                conductivity=conduction.conductivity,
-                contact_resistance=conduction.contact_resistance,
-                mixture=None if mixture is None else Mixture(mixture.conductivity, mixture.fraction),
-                tolerance=conduction.tolerance,
-                angle_curve=conduction.angle_curve,
-            ),
-            composite=self._composite_spec(),
+            packing=self.packing.spec(density, radius_growth=self.contacts.rule == "overlap" and engine.needs_contacts),
+            rule=self.contacts.rule,
+            conduction=tuple(self._conduction(method) for method in self.methods),
+            values={name: values[0] for name, values in si.items() if name not in self.axes},
+            axes={name: values for name, values in si.items() if name in self.axes},
         )
 
-    def _composite_spec(self) -> CompositeSpec | None:
-        table = self.composite
-        if table is None:
-            return None
-        return CompositeSpec(table.matrix_conductivity, table.contrast or (), table.resolution, table.nodes)
+    def _conduction(self, method: str) -> Conduction:
+        """How one of the methods conducts, with the options that it heeds."""
+        table, heeded = self.conduction, ENGINES[self.conduction.engine].methods[method].options
+        options = {name: getattr(table, name) for name in OPTIONS if name in heeded}
+        return Conduction(table.engine, method, options, table.tolerance)
 
 
 def read_study(path: Path) -> tuple[Study, str]:
-    """Read and check a study file; answers the study and its text.
+    """The study in a file, and its text.
 
     Raises
     ------
@@ -229,31 +208,53 @@ def read_study(path: Path) -> tuple[Study, str]:
         If the file is missing, is not TOML, has unknown keys or values that are not allowed; the message is
         one line that names the file, the key, what was found and what is allowed.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise StudyError(f"study {path}: cannot be read ({error.strerror}), expected a TOML file") from None
-    except UnicodeDecodeError:
-        raise StudyError(f"study {path}: is not text in UTF-8, expected a TOML file") from None
+    text = read_text(path)
     return parse_study(text, str(path)), text
 
 
 def parse_study(text: str, source: str = "study") -> Study:
-    """Check the text of a study file; ``source`` names it in errors.
+    """The study in a text; ``source`` names it in errors.
 
     Examples
     --------
-    >>> parse_study("[packing", "s.toml")
+    >>> parse_study("schema = 2", "s.toml")
     Traceback (most recent call last):
-    etc_engine.errors.StudyError: s.toml: is not valid TOML: ...
+    etc_engine.errors.StudyError: s.toml: name: missing, expected a name ... (and 3 more problems)
     """
-    try:
-        values = tomllib.loads(text)
-    except RecursionError:
-        raise StudyError(f"{source}: is not valid TOML: it is nested too deeply") from None
-    except ValueError as error:  # beside its own errors: numbers of 5000 digits
-        raise StudyError(f"{source}: is not valid TOML: {error}") from None
-    try:
-        return Study.model_validate(values)
-    except ValidationError as error:
-        raise StudyError(f"{source}: {first_problem(error, Study, HINTS)}") from None
+    return validated(parse_toml(text, source), Study, source)
+
+
+def study_schema() -> dict[str, Any]:
+    """The JSON schema of a study file, with an example.
+
+    Beside the standard words, a key that only has a meaning with some words of a choice names them in ``x-with``, and
+    the words of a key that depends on another choice stand in ``x-words``.
+
+    Examples
+    --------
+    >>> keys = study_schema()["$defs"]["ContactsTable"]["properties"]
+    >>> keys["coordination"]["x-with"]["contacts.rule"]
+    ['coordination']
+    """
+    found = Study.model_json_schema()
+    tables = {key: node["$ref"].rpartition("/")[2] for key, node in found["properties"].items() if "$ref" in node}
+    for place, needs in MEANING.items():
+        table, key = place.split(".")
+        property_ = found["$defs"][tables[table]]["properties"][key]
+        property_["x-with"] = {choice: list(words) for choice, words in needs.items()}
+    methods = {word: list(engine.methods) for word, engine in ENGINES.items()}
+    found["$defs"][tables["conduction"]]["properties"]["method"]["x-words"] = {"conduction.engine": methods}
+    found["examples"] = [EXAMPLE]
+    return found
+
+
+EXAMPLE = {
+    "schema": SCHEMA,
+    "name": "example",
+    "seed": 20261,
+    "packing": {"radii": "uniform:0.01:0.02", "box": [1.0, 1.0], "density": [0.64, 0.70, 0.76]},
+    "contacts": {"rule": "bonded", "contact_angle": [5.0, 10.0]},
+    "statistics": {"realizations": 20},
+    "models": {"names": ["hashin_shtrikman_upper", "effective_medium", "contact_mean_field"]},
+}
+"""A study that is ready to run."""

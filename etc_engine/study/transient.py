@@ -1,111 +1,57 @@
-"""Transient study files of kind "network": the schema."""
+"""The study file of a transient on a contact network."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Tag, ValidationError, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from etc_engine.errors import InputError, StudyError
-from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated, TimeTable, WallCondition
+from etc_engine.errors import StudyError
+from etc_engine.medium.walls import WallCondition
 from etc_engine.realization import ENGINES
 from etc_engine.solvers.marching import SCHEMES
+from etc_engine.study.files import A_SEED, Seed, StudyFile, validated
+from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.schema import (
     AS_LIST,
     AS_NUMBER,
     AS_TABLE,
     MOST_STEPS,
-    NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
     WRITTEN,
     Flag,
-    NotNegative,
     Number,
     Positive,
     Steps,
     StudyTable,
     Times,
     Word,
-    first_problem,
 )
-from etc_engine.study.tables import ContactsTable, PackingTable
+from etc_engine.study.tables import ContactsTable, Engine, PackingTable
+from etc_engine.study.walls import A_VALUE, Value, Wall
 
 SOME = Field(min_length=1)
-A_VALUE = f"{NUMBER}, or a table {{ times = [...], values = [...] }}"
-
-
-class History(StudyTable):
-    """Values at increasing times, linear in between and constant outside."""
-
-    times: Times = Field(description=f"a list of times [s], each {NUMBER}")
-    values: list[Number] = Field(description=f"a list of values, each {NUMBER}")
-
-    @model_validator(mode="after")
-    def _check(self) -> History:
-        try:
-            self.table()
-        except InputError as error:
-            raise ValueError(str(error)) from None
-        return self
-
-    def table(self) -> TimeTable:
-        """As a value of a wall or a source."""
-        return TimeTable(tuple(self.times), tuple(self.values))
-
-
-Value = Annotated[Annotated[Number, Tag(AS_NUMBER)] | Annotated[History, Tag(AS_TABLE)], WRITTEN]
-
-
-def plain(value: float | History) -> float | TimeTable:
-    """A number or a table as `etc_engine.medium.walls` takes it."""
-    return value.table() if isinstance(value, History) else value
-
-
-class Wall(StudyTable):
-    """One wall of ``[walls]``: how it exchanges heat."""
-
-    type: Literal["fixed", "flux", "convective", "insulated"] = Field(
-        description="fixed, flux, convective or insulated"
-    )
-    value: Value | None = Field(
-        default=None,
-        description=f"{A_VALUE}: temperature [K], heat flux into the body [W/m2] or ambient temperature [K]",
-    )
-    coefficient: Positive | None = Field(
-        default=None, description=f"{POSITIVE}, the heat transfer coefficient [W/(m2 K)]"
-    )
-
-    @model_validator(mode="after")
-    def _check(self) -> Wall:
-        if self.type == "convective" and self.coefficient is None:
-            raise ValueError("coefficient: missing, type = 'convective' needs one [W/(m2 K)]")
-        if self.type != "convective" and self.coefficient is not None:
-            raise ValueError(f"coefficient: has no meaning with type = {self.type!r}, take it out")
-        if self.type != "insulated" and self.value is None:
-            raise ValueError(f"value: missing, type = {self.type!r} needs one")
-        if self.type == "insulated" and self.value is not None:
-            raise ValueError("value: has no meaning with type = 'insulated', take it out")
-        return self
-
-    def condition(self) -> WallCondition:
-        """The condition of this wall."""
-        if self.value is None:
-            return Insulated()
-        if self.type == "fixed":
-            return FixedTemperature(plain(self.value))
-        if self.type == "flux":
-            return HeatFlux(plain(self.value))
-        assert self.coefficient is not None
-        return Convective(self.coefficient, plain(self.value))
-
-
 A_WALL = "a table such as { type = 'fixed', value = 1.0 }"
+
+
+class FileTable(StudyTable):
+    """``[packing]`` of particles in a file."""
+
+    files: Word = Field(description="a particle file, relative to the study file")
+    frames: Annotated[int, Field(strict=True)] | Literal["last"] = Field(
+        default="last", description="'last', or the number of a frame of a dump, from 0"
+    )
+    box: tuple[Positive, Positive] | None = Field(default=None, description="two positive edge lengths, of a CSV file")
+    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, of a CSV file")
+
+
+def _made_or_read(packing: object) -> str:
+    read = "files" in packing if isinstance(packing, Mapping) else isinstance(packing, FileTable)
+    return "read" if read else "made"
 
 
 class WallsTable(StudyTable):
@@ -122,29 +68,29 @@ class WallsTable(StudyTable):
         return {name: wall.condition() for name, wall in given.items() if wall is not None}
 
 
-SYSTEMS = ("pipe", *(name for name, method in ENGINES["dtem"].methods.items() if method.transient))
-
-
 class Conduction(StudyTable):
-    """``[conduction]``: the method and the contacts' material."""
+    """``[conduction]``: the engine and its method."""
 
-    method: Word = Field(default="pipe", description=", ".join(SYSTEMS))
-    pipe_resistance: Literal["chord", "uniform"] | None = Field(default=None, description="chord or uniform")
+    engine: Engine = Field(default="dtem", description="dtem or pipe")
+    method: Word = Field(default="chord", description="a method of the engine")
     dipoles: Flag = Field(default=False, description="true or false")
-    conductivity: Positive | None = Field(
-        default=None, description=f"{POSITIVE}, of the particles [W/(m K)]; 1 by default"
-    )
-    contact_resistance: NotNegative = Field(default=0.0, description=f"{NOT_NEGATIVE} [m K/W]")
 
     @model_validator(mode="after")
     def _check(self) -> Conduction:
-        if self.method not in SYSTEMS:
-            raise ValueError(f"method: found {self.method!r}, allowed: {', '.join(SYSTEMS)}")
-        if self.method != "pipe" and self.pipe_resistance is not None:
-            raise ValueError("pipe_resistance goes with method = 'pipe'")
-        if self.method == "pipe" and self.dipoles:
-            raise ValueError("dipoles have no meaning with method = 'pipe': a particle has one temperature")
+        if self.engine not in TRANSIENT:
+            raise ValueError(f"engine: found {self.engine!r}, a transient takes {' or '.join(TRANSIENT)}")
+        allowed = TRANSIENT[self.engine]
+        if self.method not in allowed:
+            raise ValueError(f"method: found {self.method!r}, allowed with {self.engine}: {', '.join(allowed)}")
+        if self.dipoles and "dipoles" not in ENGINES[self.engine].methods[self.method].options:
+            raise ValueError(f"dipoles have no meaning with engine = {self.engine!r}: a particle has one temperature")
         return self
+
+
+TRANSIENT = {
+    word: found for word, row in ENGINES.items() if (found := [name for name, m in row.methods.items() if m.transient])
+}
+"""Methods with a transient form, by engine."""
 
 
 class Gradient(StudyTable):
@@ -155,7 +101,7 @@ class Gradient(StudyTable):
 
 
 class Source(StudyTable):
-    """One of ``[[source]]``: heat set free in each of some particles (all by default) [W/m]."""
+    """One of ``[[source]]``: heat released in each of some particles (all by default) [W/m]."""
 
     heat: Value = Field(description=f"{A_VALUE} [W/m]")
     particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
@@ -163,9 +109,10 @@ class Source(StudyTable):
     )
 
 
-class Material(StudyTable):
-    """``[material]``: storage and initial temperatures; a number, or one for each particle."""
+class ParticlesTable(StudyTable):
+    """``[particles]``: what they are made of, and how warm they are at first; a number, or one for each particle."""
 
+    conductivity: Positive = Field(default=1.0, description=f"{POSITIVE} [W/(m K)]")
     heat_capacity: Annotated[
         Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], SOME, Tag(AS_LIST)], WRITTEN
     ] = Field(description=f"{POSITIVE}, or a list of such, one for each particle: rho c [J/(m3 K)]")
@@ -233,38 +180,26 @@ class Motion(StudyTable):
     reference: Number = Field(default=0.0, description=f"{NUMBER}, temperature of the radii in the dump [K]")
 
 
-class NetworkStudy(StudyTable):
+class NetworkStudy(StudyFile):
     """A transient study of kind "network"."""
 
-    schema_version: Literal[1] = Field(alias="schema", description="1")
     kind: Literal["network"] = Field(description="network")
-    name: Word = Field(description="a name")
-    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] | None = Field(
-        default=None, description="a whole number from 0 to 2**63 - 1, with [packing]"
-    )
-    particles: Word | None = Field(default=None, description="a particle file, relative to the study file")
-    frame: Annotated[int, Field(strict=True)] | None = Field(
-        default=None, description="the number of a frame of a dump, from 0; the last one by default"
-    )
-    box: tuple[Positive, Positive] | None = Field(default=None, description="two positive edge lengths, of a CSV file")
-    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, of a CSV file")
-    packing: PackingTable | None = None
-    contacts: ContactsTable = ContactsTable()
-    conduction: Conduction = Conduction()
-    material: Material = Field(description="a table with heat_capacity and initial")
-    walls: WallsTable = WallsTable()
+    seed: Seed | None = Field(default=None, description=f"{A_SEED}, if particles are packed")
+    packing: Annotated[
+        Annotated[PackingTable, Tag("made")] | Annotated[FileTable, Tag("read")], Discriminator(_made_or_read)
+    ] = Field(description="a table with files, or with the words of the command pack")
+    particles: ParticlesTable = Field(description="a table with heat_capacity and initial")
+    contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
+    conduction: Conduction = Field(default_factory=Conduction, description="a table")
+    walls: WallsTable = Field(default_factory=WallsTable, description="a table")
     source: list[Source] = Field(default=[], description="tables [[source]] with heat and particles")
     motion: Motion | None = Field(default=None, description="a table with timestep")
     time: Time = Field(description="a table with times and steps")
 
     @model_validator(mode="after")
     def _check(self) -> NetworkStudy:
-        if (self.particles is None) == (self.packing is None):
-            raise ValueError("particles, a file, or a table [packing] is needed, and not both")
-        if self.packing is not None:
-            if self.box is not None or self.periodic is not None or self.frame is not None:
-                raise ValueError("box, periodic and frame go with a particle file; [packing] has its own")
-            if len(self.packing.box) != 2 or len(self.packing.density or (0.0,)) != 1:
+        if isinstance(self.packing, PackingTable):
+            if len(self.packing.box) != 2 or isinstance(getattr(self.packing, "density", None), tuple):
                 raise ValueError("[packing] makes one packing: a box of two lengths, and one density")
             if self.seed is None:
                 raise ValueError("seed: [packing] draws random numbers, give a whole number")
@@ -276,16 +211,16 @@ class NetworkStudy(StudyTable):
             refuse_endless(self.time, self.time.times)
         except StudyError as error:
             raise ValueError(str(error)) from None
-        if len(self.contacts.contact_angle or (0.0,)) != 1:
-            raise ValueError("contacts.contact_angle: a transient has one half-angle")
+        for row in QUANTITIES.values():
+            if row.table == "contacts" and isinstance(getattr(self.contacts, row.key), tuple):
+                raise ValueError(f"{row.place}: a transient takes one value, found a list")
         return self
 
     def _check_motion(self, motion: Motion) -> None:
         """Frames of a dump, and their times."""
-        if self.particles is None or self.frame is not None or self.box is not None:
-            raise ValueError(
-                "motion: it takes all frames of a dump, whose name is in particles, and the dump's own box"
-            )
+        file = self.packing
+        if not isinstance(file, FileTable) or "frames" in file.model_fields_set or file.box is not None:
+            raise ValueError("motion: it takes all frames of a dump, the file of packing.files, and the dump's own box")
         if self.time.times:
             raise ValueError("time.times: with [motion] the output times are those of the frames, take them out")
         if self.time.scheme != "adaptive" and self.time.steps is None:
@@ -295,21 +230,9 @@ class NetworkStudy(StudyTable):
         if motion.expansion != 0.0 and self.contacts.rule != "overlap":
             raise ValueError("motion.expansion: radii change the contacts of rule = 'overlap' only")
 
-    def resolved(self) -> dict[str, Any]:
-        """The study with all defaults written out, as plain JSON values."""
-        return self.model_dump(mode="json", by_alias=True)
 
-    def identity(self) -> dict[str, Any]:
-        """What decides the numbers: everything but the name."""
-        return {key: value for key, value in self.resolved().items() if key != "name"}
-
-    def digest(self) -> str:
-        """SHA-256 of the identity."""
-        return hashlib.sha256(json.dumps(self.identity(), sort_keys=True).encode()).hexdigest()
-
-
-def parse_study(content: Mapping[str, Any]) -> NetworkStudy:
-    """The study of a parsed TOML file.
+def parse_study(content: Mapping[str, Any], source: str = "study") -> NetworkStudy:
+    """The study of a file's content.
 
     Raises
     ------
@@ -318,11 +241,8 @@ def parse_study(content: Mapping[str, Any]) -> NetworkStudy:
 
     Examples
     --------
-    >>> parse_study({"schema": 1, "kind": "network", "name": "bed"})
+    >>> parse_study({"schema": 2, "kind": "network", "name": "bed", "packing": {"files": "bed.dump"}})
     Traceback (most recent call last):
-    etc_engine.errors.StudyError: material: missing, expected a table ... (and 1 more problem)
+    etc_engine.errors.StudyError: study: particles: missing, expected a table ... (and 1 more problem)
     """
-    try:
-        return NetworkStudy.model_validate(dict(content))
-    except ValidationError as error:
-        raise StudyError(first_problem(error, NetworkStudy)) from None
+    return validated(content, NetworkStudy, source)

@@ -109,7 +109,7 @@ def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str 
     >>> difference({"seed": 7, "packing": {"count": 3}}, {"seed": 7, "packing": {"count": 4}})
     'packing.count is 3 there and 4 here'
     """
-    for key in sorted({*found, *wanted}):
+    for key in sorted({*found, *wanted}, key=lambda key: (key != "schema", key)):
         there, here = found.get(key), wanted.get(key)
         if isinstance(there, Mapping) and isinstance(here, Mapping):
             inner = difference(there, here, f"{prefix}{key}.")

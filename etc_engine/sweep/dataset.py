@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 from etc_engine.durable.files import replacing
 from etc_engine.errors import OutputError
 from etc_engine.realization import Status
+from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.statistics import summarize
-from etc_engine.sweep.table import CELL_VARIABLES, UNIT_VARIABLES, Table
+from etc_engine.sweep.table import CELL_VARIABLES, MEASURES, UNIT_VARIABLES, Table
 
 if TYPE_CHECKING:
     import xarray
 
 Values = dict[str, NDArray[Any]]
-SWEPT = ("density", "contact_angle", "contrast", "method")
-"""The dimensions of the cells; a result has those its study varies, and always ``density``."""
-
 UNIT = ("density", "realization")
 TENSOR = ("direction_i", "direction_j")
 INCIDENTAL = ("_seconds", "_rank", "_host", "_time")
@@ -40,19 +38,6 @@ STREAM_COMMENT = (
     "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
     "of the density as a double (NaN: the packer's own); stored is generate_state(1, uint64) of the sequence"
 )
-VARIANTS = {
-    "contact_angle": {
-        "long_name": "contact half-angle",
-        "units": "degree",
-        "comment": "half of the angle that the contact arc subtends at the centre of a disk; not a wetting angle",
-    },
-    "contrast": {
-        "long_name": "contrast",
-        "units": "1",
-        "comment": "conductivity of the particles over that of the matrix",
-    },
-}
-"""Attributes of the second axis of a sweep."""
 
 
 def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarray.Dataset:
@@ -70,19 +55,19 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     Returns
     -------
     xarray.Dataset
-        Dimensions ``density``, ``contact_angle`` or ``contrast`` (only where the study gives some), ``method`` (only
-        where it lists methods), ``realization``, ``direction_i``, ``direction_j``.
+        Dimensions ``density``, then those quantities that the study gives as a list, in the order of
+        `etc_engine.study.quantities.QUANTITIES`, ``method`` (only where it lists methods), ``realization``,
+        ``direction_i``, ``direction_j``. A quantity with one value is a coordinate without a dimension.
     """
     import xarray
 
     cells, units = _cell_values(study, table), _unit_values(study, table)
-    variant, values = study.variants
-    swept = ("density", variant, "method")
+    swept = ("density", *study.axes, "method")
     cell = (*swept, "realization")
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
-    if "exact" in study.conduction.methods:
+    if "exact" in study.methods:
         meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
         dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
@@ -91,56 +76,50 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     dataset["status"] = (cell, cells["status"], _status_attributes())
     dataset["message"] = (cell, cells["message"], {"long_name": "what went wrong, in words"})
     for name, variable in UNIT_VARIABLES.items():
-        dataset[name] = (UNIT, units[name], variable.attributes)
+        measure = MEASURES[study.box.dimension]
+        meaning = {**variable.attributes, "long_name": variable.long_name.format(measure=measure)}
+        dataset[name] = (UNIT, units[name], meaning)
     dataset["random_stream"].attrs["comment"] = STREAM_COMMENT
     _add_statistics(dataset, swept, cells, study.statistics.confidence)
-    if values is None:
-        dataset = dataset.isel({variant: 0}, drop=True)
-    if isinstance(study.conduction.method, str):
-        dataset = dataset.isel(method=0, drop=True)
-    return dataset
+    return dataset if isinstance(study.conduction.method, tuple) else dataset.isel(method=0, drop=True)
 
 
 def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str, Any]:
-    axes = list("xyz"[: study.box.dimension])
-    density, comment = study.packing.density, "sum of the full particle areas over the area of the box"
-    if density is None:
+    axes = np.array(list("xyz"[: study.box.dimension]), dtype=object)
+    measure = MEASURES[study.box.dimension]
+    density, comment = study.values("density"), f"sum of the full particle {measure}s over the {measure} of the box"
+    if not density:
         reached = packing_density[np.isfinite(packing_density)]
         density = (float(reached.mean()) if reached.size else np.nan,)
         comment += "; the packer's own, mean over realizations"
-    variant, values = study.variants
-    return {
+    found: dict[str, Any] = {
         "density": ("density", np.array(density), {"long_name": "density", "units": "1", "comment": comment}),
-        variant: (variant, np.array(values or (np.nan,)), VARIANTS[variant]),
-        "method": ("method", np.array(study.conduction.methods, dtype=object), {"long_name": "method"}),
-        "realization": (
-            "realization",
-            np.arange(study.statistics.cap),
-            {"long_name": "realization", "units": "1"},
-        ),
-        "direction_i": ("direction_i", np.array(axes, dtype=object), {"long_name": "direction of the flux"}),
-        "direction_j": (
-            "direction_j",
-            np.array(axes, dtype=object),
-            {"long_name": "direction of the gradient"},
-        ),
+        "method": ("method", np.array(study.methods, dtype=object), {"long_name": "method"}),
+        "realization": ("realization", np.arange(study.statistics.cap), {"long_name": "realization", "units": "1"}),
+        "direction_i": ("direction_i", axes, {"long_name": "direction of the flux"}),
+        "direction_j": ("direction_j", axes, {"long_name": "direction of the gradient"}),
     }
+    for name, values in study.quantities.items():
+        several = name in study.axes
+        found[name] = (name if several else (), np.array(values if several else values[0]), QUANTITIES[name].attributes)
+    return found
 
 
 def _cell_values(study: Study, table: Table) -> Values:
-    """Arrays over (density, contact angle or contrast, method, realization)."""
-    rows, d = table.rows, study.box.dimension
-    variants, methods = rows.dtype["status"].shape
-    shape = (len(study.densities), variants, methods, study.statistics.cap)
+    """Arrays over (density, axes of the study, method, realization)."""
+    rows, d, cells = table.rows, study.box.dimension, study.shape
+    shape = (len(study.densities), *cells, study.statistics.cap)
     values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in CELL_VARIABLES.items()}
     values["conductivity"] = np.full((*shape, d, d), np.nan)
     values["conductivity_bounds"] = np.full((*shape, d, 2), np.nan)
     values["status"] = np.full(shape, Status.NOT_RUN, np.int8)
+    every: Any = (slice(None),) * len(cells)
     for name, grid in values.items():
-        grid[rows["density_index"], :, :, rows["realization"]] = rows[name]
+        grid[(rows["density_index"], *every, rows["realization"])] = rows[name]
     values["message"] = np.full(shape, "", object)
-    for (i, r, a, m), text in table.messages.items():
-        values["message"][i, a, m, r] = text
+    for (i, r, place), text in table.messages.items():
+        at: Any = (i, *np.unravel_index(place, cells), r)
+        values["message"][at] = text
     return values
 
 

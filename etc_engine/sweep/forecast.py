@@ -71,11 +71,11 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
     costly = first if first > PROBE_SECONDS else _probe(study, units[0], realize)[0]
     same = units[-1, 0] == units[0, 0] or first > PROBE_SECONDS
     cheap = costly if same else _probe(study, units[-1], realize)[0]
-    messages = dict.fromkeys(cell.message for row in record.result.cells for cell in row if cell.message)
+    messages = dict.fromkeys(cell.message for cell in record.result.cells if cell.message)
     return Forecast(
         units=len(units),
         most_units=len(study.densities) * study.statistics.cap,
-        cells=len(units) * sum(map(len, record.result.cells)),
+        cells=len(units) * len(record.result.cells),
         finished=sum(tuple(unit) in done for unit in units.tolist()),
         state=state,
         ranks=ranks,

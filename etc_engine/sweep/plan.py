@@ -1,8 +1,7 @@
 """The plan of a sweep: work units, their order, their random streams, and how many a cell needs.
 
-A unit is one packing, (density, realization); it serves every contact angle and method. Everything here
-is a pure function of the study and of results, so that any number of ranks and any history of restarts
-makes the same plan.
+A unit is one packing, (density, realization); everything else that a study varies is solved on it. All functions here
+are pure functions of the study and of results: any number of ranks and any history of restarts makes the same plan.
 """
 
 from __future__ import annotations
@@ -177,8 +176,10 @@ def next_targets(study: Study, targets: Sequence[int], table: Table) -> tuple[in
 
 def _samples(rows: NDArray[Any]) -> Iterator[NDArray[np.float64]]:
     """Valid conductivities of each cell and each direction that has one."""
-    angles, methods, d, _ = rows.dtype["conductivity"].shape
-    for a, m, k in np.ndindex(angles, methods, d):
-        samples = rows["conductivity"][rows["status"][:, a, m] <= Status.NOT_PERCOLATING, a, m, k, k]
-        if np.isfinite(samples).all():
-            yield samples
+    *cells, d, _ = rows.dtype["conductivity"].shape
+    for place in np.ndindex(*cells):
+        valid = rows["status"][(slice(None), *place)] <= Status.NOT_PERCOLATING
+        for k in range(d):
+            samples = rows["conductivity"][(valid, *place, k, k)]
+            if np.isfinite(samples).all():
+                yield samples

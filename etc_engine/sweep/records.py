@@ -6,14 +6,15 @@ JSON writes a double as the shortest decimal that reads back to the same bits.
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
+from etc_engine.errors import OutputError
 from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
-from etc_engine.realization.outcome import uniform_cells
 from etc_engine.sweep.plan import Unit
 
 
@@ -31,15 +32,14 @@ class Record:
     @property
     def failed(self) -> int:
         """Cells of the unit that ended without a conductivity."""
-        return sum(cell.status > Status.NOT_PERCOLATING for row in self.result.cells for cell in row)
+        return sum(cell.status > Status.NOT_PERCOLATING for cell in self.result.cells)
 
 
-def failed_realization(error: Exception, spec: RealizationSpec, dimension: int) -> Realization:
+def failed_realization(error: Exception, spec: RealizationSpec) -> Realization:
     """The result of a unit that raised: every cell has status ERROR and says why."""
     message = _steady(f"{type(error).__name__}: {error}")
-    nowhere = np.full((dimension, dimension), np.nan)
-    cell = Outcome(Status.ERROR, message, conductivity=nowhere)
-    return Realization(0, np.nan, np.nan, 0.0, uniform_cells(spec, cell))
+    cells = (Outcome(Status.ERROR, message),) * math.prod(spec.shape)
+    return Realization(0, np.nan, np.nan, 0.0, cells)
 
 
 def _steady(message: str) -> str:
@@ -51,43 +51,58 @@ def encode(record: Record) -> str:
     """A record as one line of JSON, without the newline."""
     values = asdict(record)
     values["unit"] = [record.unit.density, record.unit.realization]
-    values["result"]["cells"] = [[_plain_cell(cell) for cell in row] for row in record.result.cells]
+    values["result"]["cells"] = [_plain_cell(cell) for cell in record.result.cells]
     return json.dumps(values, default=_plain_scalar)
 
 
 def decode(line: str) -> Record:
-    """The record that `encode` wrote.
+    """The record that `encode` wrote; what an older version of the engine did not write has its default.
+
+    Raises
+    ------
+    OutputError
+        If another version of the engine wrote something that this one does not know.
 
     Examples
     --------
     >>> cell = Outcome(Status.OK, conductivity=np.array([[0.1 + 0.2, np.nan], [np.nan, 1.0]]))
-    >>> record = Record(Unit(0.7, 3), Realization(9, 0.7, 0.7, 0.1, ((cell,),)), 0, "node", 1.0, 2.0)
-    >>> decode(encode(record)).result.cells[0][0].conductivity[0, 0] == 0.1 + 0.2
+    >>> record = Record(Unit(0.7, 3), Realization(9, 0.7, 0.7, 0.1, (cell,)), 0, "node", 1.0, 2.0)
+    >>> decode(encode(record)).result.cells[0].conductivity[0, 0] == 0.1 + 0.2
     np.True_
     """
     values = json.loads(line)
-    result = values.pop("result")
-    cells = tuple(tuple(_cell(cell) for cell in row) for row in result.pop("cells"))
-    return Record(unit=Unit(*values.pop("unit")), result=Realization(cells=cells, **result), **values)
+    try:
+        result = values.pop("result")
+        cells = tuple(_cell(cell) for cell in _flat(result.pop("cells")))
+        return Record(unit=Unit(*values.pop("unit")), result=Realization(cells=cells, **result), **values)
+    except (TypeError, KeyError, ValueError) as error:
+        raise OutputError(
+            f"a shard holds a record of another version of the engine ({error}): finish the sweep with that version, "
+            "or start anew with --overwrite"
+        ) from None
+
+
+def _flat(cells: list[Any]) -> list[dict[str, Any]]:
+    """Cells as a list; older versions wrote a list of lists."""
+    return [inner for cell in cells for inner in (cell if isinstance(cell, list) else [cell])]
 
 
 def _plain_cell(cell: Outcome) -> dict[str, Any]:
     values = {field.name: getattr(cell, field.name) for field in fields(Outcome)}
     values["status"] = int(cell.status)
-    values["conductivity"] = np.asarray(cell.conductivity, dtype=np.float64).tolist()
+    if cell.conductivity is not None:
+        values["conductivity"] = np.asarray(cell.conductivity, dtype=np.float64).tolist()
     return values
 
 
 def _cell(values: dict[str, Any]) -> Outcome:
-    status, conductivity = (
-        Status(values.pop("status")),
-        np.array(values.pop("conductivity"), dtype=np.float64),
-    )
+    status, tensor = Status(values.pop("status")), values.pop("conductivity")
+    conductivity = None if tensor is None else np.array(tensor, dtype=np.float64)
     return Outcome(status=status, conductivity=conductivity, **values)
 
 
 def _plain_scalar(value: object) -> object:
-    """Engines may answer numpy scalars; JSON knows Python's."""
+    """Engines may return numpy scalars; JSON takes those of Python."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"a record holds numbers and words, found {type(value).__name__}")

@@ -43,12 +43,12 @@ def rerun(
     realization: int,
     realize: Realize,
 ) -> Comparison:
-    """Compute one realization of a sweep's dataset again, with all its contact angles and methods.
+    """Compute one realization of a sweep's dataset again, with all that was solved on its packing.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        What :func:`etc_engine.sweep.dataset.open_dataset` answers.
+        From :func:`etc_engine.sweep.dataset.open_dataset`.
     density : float or None
         A value of the coordinate (to six digits); None if there is only one.
     realization : int

@@ -232,7 +232,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     try:
         result = realize(spec, unit_rng(study.seed, unit))
     except Exception as error:
-        result = failed_realization(error, spec, study.box.dimension)
+        result = failed_realization(error, spec)
     return Record(unit, result, rank, socket.gethostname(), started, time.time())
 
 

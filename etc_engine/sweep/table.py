@@ -1,7 +1,7 @@
 """The table of a sweep: finished units as rows of one structured array, the cells of a unit in its row.
 
-Ranks turn the shards into rows side by side and rank 0 joins the arrays; one by one on rank 0, records
-would take longer than computing them as soon as some thousand ranks work.
+The ranks turn the shards into rows in parallel and rank 0 joins the arrays. Record by record on rank 0, reading would
+take longer than computing as soon as some thousand ranks work.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.realization import Status
+from etc_engine.realization import Outcome, Status
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.plan import stream_fingerprint
 from etc_engine.sweep.records import Record
@@ -42,22 +42,25 @@ CELL_VARIABLES = {
     "iterations": Variable(np.int64, -1, "iterations of the linear solver"),
     "relative_energy_error": Variable(np.float64, np.nan, "estimated relative error of the conductivity"),
     "model_error_estimate": Variable(
-        np.float64, np.nan, "estimated relative error of the method: chord, if solved in full, and exact"
+        np.float64, np.nan, "estimated relative error of the method: chord if solved in full, exact, voxel and lattice"
     ),
     "mean_field_conductivity": Variable(
         np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
     ),
     "solve_seconds": Variable(np.float64, np.nan, "time to solve", "s"),
     "solved_by": Variable(object, "", "full, or reduced: made of the solutions at other contact angles"),
-    "snapshots": Variable(np.int64, -1, "solutions at other contact angles that a reduced one is made of"),
+    "snapshots": Variable(np.int64, -1, "solutions at other contact angles in a reduced one"),
 }
 WORD = "U64"
 """Longest word, such as the name of a host, that a row holds."""
 
+MEASURES = {2: "area", 3: "volume"}
+"""What a density is a fraction of, by dimension."""
+
 UNIT_VARIABLES = {
     "particles": Variable(np.int64, -1, "number of particles, before pruning"),
-    "packing_density": Variable(np.float64, np.nan, "sum of full particle areas over the area of the box"),
-    "solid_fraction": Variable(np.float64, np.nan, "area of the union of the particles over the area of the box"),
+    "packing_density": Variable(np.float64, np.nan, "sum of full particle {measure}s over the {measure} of the box"),
+    "solid_fraction": Variable(np.float64, np.nan, "{measure} of the union of the particles over that of the box"),
     "pack_seconds": Variable(np.float64, np.nan, "time to pack", "s"),
     "random_stream": Variable(np.uint64, 0, "first 64 bits of the random stream"),
     "worker_rank": Variable(np.int64, -1, "rank that computed the realization"),
@@ -74,14 +77,15 @@ class Table:
     Parameters
     ----------
     rows : ndarray, shape (n,)
-        Fields ``density_index``, ``realization``, the names of `UNIT_VARIABLES`, and with shape (variants, methods)
-        those of `CELL_VARIABLES`, ``status`` and ``conductivity`` (there (variants, methods, d, d)).
+        Fields ``density_index``, ``realization``, the names of `UNIT_VARIABLES`, and with the shape of the cells
+        (axes, methods) those of `CELL_VARIABLES`, ``status``, ``conductivity`` (there (..., d, d)) and
+        ``conductivity_bounds`` (there (..., d, 2)).
     messages : dict
-        (density index, realization, variant, method) -> what went wrong.
+        (density index, realization, place of the cell among all of its unit) -> what went wrong.
     """
 
     rows: NDArray[Any]
-    messages: dict[tuple[int, int, int, int], str] = field(default_factory=dict)
+    messages: dict[tuple[int, int, int], str] = field(default_factory=dict)
 
     @property
     def units(self) -> NDArray[np.int64]:
@@ -91,8 +95,7 @@ class Table:
 
 def row_type(study: Study) -> np.dtype[Any]:
     """The numpy type of a row."""
-    cells = (len(study.variants[1] or (None,)), len(study.conduction.methods))
-    d = study.box.dimension
+    cells, d = study.shape, study.box.dimension
     fields: list[Any] = [("density_index", np.int64), ("realization", np.int64)]
     fields += [(name, WORD if v.dtype is object else v.dtype) for name, v in UNIT_VARIABLES.items()]
     fields += [(name, WORD if v.dtype is object else v.dtype, cells) for name, v in CELL_VARIABLES.items()]
@@ -119,21 +122,28 @@ def tabulate(study: Study, records: Iterable[Record]) -> Table:
     rows["worker_host"] = [record.host for record in records]
     rows["start_time"] = [record.start_time for record in records]
     rows["end_time"] = [record.end_time for record in records]
-    for name in (*CELL_VARIABLES, "status", "conductivity"):
-        rows[name] = [[[getattr(cell, name) for cell in row] for row in result.cells] for result in results]
-    unknown = np.full((study.box.dimension, 2), np.nan)
-    rows["conductivity_bounds"] = [
-        [[cell.conductivity_bounds or unknown for cell in row] for row in result.cells] for result in results
-    ]
-    rows["conductivity"][rows["status"] > Status.NOT_PERCOLATING] = np.nan
+    cells, d = study.shape, study.box.dimension
+    every = [cell for result in results for cell in result.cells]
+    for name in (*CELL_VARIABLES, "status"):
+        rows[name] = np.array([getattr(cell, name) for cell in every], rows[name].dtype).reshape(-1, *cells)
+    tensors = np.array([_known(cell, cell.conductivity, (d, d)) for cell in every])
+    bounds = np.array([_known(cell, cell.conductivity_bounds or None, (d, 2)) for cell in every])
+    rows["conductivity"] = tensors.reshape(-1, *cells, d, d)
+    rows["conductivity_bounds"] = bounds.reshape(-1, *cells, d, 2)
     messages = {
-        (int(i), int(r), a, m): cell.message
+        (int(i), int(r), place): cell.message
         for i, r, result in zip(rows["density_index"], rows["realization"], results, strict=True)
-        for a, row in enumerate(result.cells)
-        for m, cell in enumerate(row)
+        for place, cell in enumerate(result.cells)
         if cell.message
     }
     return join([Table(rows, messages)])
+
+
+def _known(cell: Outcome, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """The values of a cell that has any; a failed one has none, whatever it stands for them."""
+    if values is None or cell.status > Status.NOT_PERCOLATING:
+        return np.full(shape, np.nan)
+    return np.asarray(values, dtype=np.float64).reshape(shape)
 
 
 def join(tables: Sequence[Table]) -> Table:

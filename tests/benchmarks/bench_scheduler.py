@@ -22,7 +22,7 @@ from etc_engine.sweep.dataset import open_dataset
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
 STUDY = """
-schema = 1
+schema = 2
 name = "bench"
 seed = 161803
 [packing]
@@ -36,7 +36,7 @@ contact_angle = [2.5, 5.0, 10.0, 15.0]
 realizations = {realizations}
 """
 REAL = """
-schema = 1
+schema = 2
 name = "real"
 seed = 161803
 [packing]

@@ -28,7 +28,7 @@ from serving import STUDY, Service
 
 from etc_engine.service import client
 
-BATCH = """schema = 1
+BATCH = """schema = 2
 name = "load {number}"
 seed = 20261
 [packing]

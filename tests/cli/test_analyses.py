@@ -74,13 +74,10 @@ def test_an_analysis_reads_the_result_of_its_study(name, tmp_path, etc_engine):
 
 def test_the_mixture_is_read_over_its_fractions(tmp_path, etc_engine):
     text = smaller("mixture", {"0.01:0.02": "0.03:0.05", "realizations = 10": "realizations = 2"})
-    results = []
-    for fraction in ("0.0", "0.5", "1.0"):
-        study, result = tmp_path / f"{fraction}.toml", tmp_path / f"{fraction}.nc"
-        study.write_text(text.replace("fraction = 0.5", f"fraction = {fraction}"))
-        assert etc_engine("sweep", study, "-o", result).returncode == 0
-        results.append(result)
-    printed = analyse("mixture", tmp_path / "figure.png", *results)
+    study, result = tmp_path / "study.toml", tmp_path / "out.nc"
+    study.write_text(re.sub(r"fraction = \[.*?\]", "fraction = [0.0, 0.5, 1.0]", text))
+    assert etc_engine("sweep", study, "-o", result).returncode == 0
+    printed = analyse("mixture", result, tmp_path / "figure.png")
     assert re.search(r"1\.00 +20\.0000 \+- 0\.0000 +20\.0000 \+- 0\.0000 +20\.0000", printed)
 
 

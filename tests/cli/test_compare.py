@@ -13,7 +13,7 @@ from etc_engine.cli import run
 from etc_engine.sweep.dataset import write_dataset
 
 STUDY = """
-schema = 1
+schema = 2
 name = "made"
 seed = 20263
 [packing]

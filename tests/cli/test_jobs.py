@@ -15,7 +15,7 @@ from etc_engine.sweep.dataset import open_dataset
 ROOT = Path(__file__).parents[2]
 JOBS = ROOT / "jobs"
 SCRIPTS = sorted(JOBS.glob("*.sh"))
-STUDY = """schema = 1
+STUDY = """schema = 2
 name = "job"
 seed = 20261
 [packing]

@@ -14,7 +14,7 @@ import pytest
 from etc_engine.sweep.dataset import write_dataset
 
 STUDY = """
-schema = 1
+schema = 2
 name = "made <for> a & report"
 seed = 20263
 [packing]

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-STUDY = """schema = 1
+STUDY = """schema = 2
 name = "again"
 seed = 20261
 [packing]

@@ -17,7 +17,7 @@ from etc_engine.study.transient import parse_study as parse_network_study
 ROOT = Path(__file__).parents[2]
 STAND_IN = ROOT / "tests" / "stand_in.py"
 STUDY = """
-schema = 1
+schema = 2
 name = "joined"
 seed = {seed}
 [packing]

@@ -18,7 +18,7 @@ from etc_engine.sweep.dataset import differing_variables, open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 STUDY = """
-schema = 1
+schema = 2
 name = "commands"
 seed = 20261
 [packing]

@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 STUDY = """
-schema = 1
+schema = 2
 kind = "network"
 name = "elements"
 seed = 7
@@ -21,7 +21,7 @@ bond_gap = 1e-3
 [conduction]
 method = "{method}"
 dipoles = {dipoles}
-[material]
+[particles]
 heat_capacity = 2.0
 initial = 0.0
 [walls]

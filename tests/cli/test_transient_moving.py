@@ -11,14 +11,15 @@ from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.transient import states
 
 STUDY = """
-schema = 1
+schema = 2
 kind = "network"
 name = "shaken bed"
-particles = "bed.dump"
+[packing]
+files = "bed.dump"
 [conduction]
-method = "pipe"
+engine = "pipe"
+[particles]
 conductivity = 2.0
-[material]
 heat_capacity = 3.0
 initial = { value = 0.0, gradient = [0.0, 1.0] }
 [walls]
@@ -89,8 +90,8 @@ def test_it_goes_on_from_its_last_state_with_the_same_bits(etc_engine, bed, monk
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('particles = "bed.dump"', 'particles = "none.dump"', "there is no file"),
-        ('particles = "bed.dump"', 'particles = "bed.dump"\nframe = 2', "it takes all frames of a dump"),
+        ('files = "bed.dump"', 'files = "none.dump"', "there is no file"),
+        ('files = "bed.dump"', 'files = "bed.dump"\nframes = 2', "it takes all frames of a dump"),
         ("steps = 2", "step = 0.01", "give the steps from frame to frame"),
         ("steps = 2", "steps = 2\ntimes = [0.0, 1.0]", "the output times are those of the frames"),
         ("timestep = 0.001", "timestep = 0.0", "motion.timestep"),

@@ -27,7 +27,7 @@ from etc_engine.transient.run import run_transient
 from etc_engine.transient.states import read_states, state_folder, state_path, write_state
 
 STUDY = """
-schema = 1
+schema = 2
 kind = "network"
 name = "bed heated from the left"
 seed = 7
@@ -38,10 +38,10 @@ box = [1.0, 1.0]
 rule = "bonded"
 contact_angle = 10.0
 bond_gap = 1e-3
-[conduction]
-method = "pipe"
 contact_resistance = 0.1
-[material]
+[conduction]
+engine = "pipe"
+[particles]
 heat_capacity = 2.0
 initial = { value = 0.1, gradient = [0.0, 0.2] }
 [walls]
@@ -185,15 +185,16 @@ def test_another_study_does_not_go_on_from_these_states(etc_engine, tmp_path):
 def test_particles_from_a_file_and_values_by_particle(etc_engine, tmp_path):
     (tmp_path / "disks.csv").write_text("x,y,radius,conductivity\n0.25,0.5,0.25,1.0\n0.75,0.5,0.25,2.0\n")
     text = """
-schema = 1
+schema = 2
 kind = "network"
 name = "two disks"
-particles = "disks.csv"
+[packing]
+files = "disks.csv"
 box = [1.0, 1.0]
 [contacts]
 rule = "bonded"
 contact_angle = 10.0
-[material]
+[particles]
 heat_capacity = [1.0, 3.0]
 initial = [5.0, 1.0]
 [time]
@@ -244,33 +245,38 @@ def test_times_of_a_picture_share_the_way_evenly():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('method = "pipe"', 'method = "magic"', "found 'magic', allowed: pipe"),
+        ('engine = "pipe"', 'engine = "magic"', "conduction.engine: found 'magic', allowed: dtem, pipe"),
+        ('engine = "pipe"', 'engine = ["pipe"]', "conduction.engine: found ['pipe'], allowed: dtem or pipe"),
+        ('engine = "pipe"', 'engine = "voxel"', "engine: found 'voxel', a transient takes dtem or pipe"),
+        (
+            'engine = "pipe"',
+            'engine = "pipe"\nmethod = "arc"',
+            "method: found 'arc', allowed with pipe: chord, uniform",
+        ),
+        ('engine = "pipe"', 'method = "pipe"', "method: found 'pipe', allowed with dtem: chord"),
+        ("schema = 2", "schema = true", "schema: found true, allowed: 2"),
         ("steps = 4", "steps = 0", "time.steps"),
         ("steps = 4", "", "needs either step"),
         ("steps = 4", "steps = 4\nstep = 0.1", "not both"),
         ("steps = 4", "steps = 4\ntolerance = 1e-3", "tolerance: has no meaning with scheme"),
         ('scheme = "bdf2"', 'scheme = "heun"', "found 'heun', allowed: explicit-euler"),
-        ("heat_capacity = 2.0", "heat_capacity = -2.0", "material.heat_capacity"),
-        (
-            "heat_capacity = 2.0",
-            "heat_capacity = [1.0, 2.0]",
-            "the heat capacity must be one number or an array",
-        ),
+        ("heat_capacity = 2.0", "heat_capacity = -2.0", "particles.heat_capacity"),
+        ("heat_capacity = 2.0", "heat_capacity = [1.0, 2.0]", "the heat capacity must be one number or an array"),
         ("seed = 7", "", "seed: [packing] draws random numbers"),
-        ("seed = 7", 'particles = "none.csv"', "and not both"),
+        ('radii = "uniform:0.03:0.05"', 'files = "none.csv"\nradii = "equal:0.1"', "packing.radii: unknown key"),
         ('type = "fixed", value = 1.0', 'type = "fixed"', "walls.left: value: missing, type = 'fixed' needs one"),
         ("coefficient = 1.5, ", "", "walls.right: coefficient: missing"),
         ("particles = [3, 4, 4]", "particles = [9999]", "there is no particle 9999"),
         ("times = [0.0, 1.0]", "times = [1.0, 0.0]", "right.value.times: they must increase"),
-        ("contact_angle = 10.0", "contact_angle = [5.0, 10.0]", "one half-angle"),
+        ("contact_angle = 10.0", "contact_angle = [5.0, 10.0]", "contacts.contact_angle: a transient takes one value"),
         ('scheme = "bdf2"\nsteps = 4', 'scheme = "explicit-euler"\nsteps = 1', "exceeds the critical one"),
         ("0.1, 0.2, 0.3", "0.2, 0.1, 0.3", "they must increase"),
         ("0.1, 0.2, 0.3", "1e-320, 0.2, 0.3", "time.times: they must increase, by 1e-100 s at least"),
         ("0.1, 0.2, 0.3", "0.1, true, 0.3", "time.times[2]: found True, allowed: a list of output times"),
-        ("heat_capacity = 2.0", "heat_capacity = 1e300", "material.heat_capacity: found 1e+300, allowed: a positive"),
-        ("heat_capacity = 2.0", "heat_capacity = '2'", "material.heat_capacity: found '2', allowed"),
-        ("heat_capacity = 2.0", "heat_capacity = []", "material.heat_capacity"),
-        ("contact_resistance = 0.1", "dipoles = 'yes'", "conduction.dipoles: found 'yes', allowed: true or false"),
+        ("heat_capacity = 2.0", "heat_capacity = 1e300", "particles.heat_capacity: found 1e+300, allowed: a positive"),
+        ("heat_capacity = 2.0", "heat_capacity = '2'", "particles.heat_capacity: found '2', allowed"),
+        ("heat_capacity = 2.0", "heat_capacity = []", "particles.heat_capacity"),
+        ('engine = "pipe"', "dipoles = 'yes'", "conduction.dipoles: found 'yes', allowed: true or false"),
         ("particles = [3, 4, 4]", "particles = [3.0]", "source[0].particles[0]: found 3.0, allowed: a list of whole"),
         ("particles = [3, 4, 4]", "particles = []", "source[0].particles: found [], allowed: a list of whole"),
         ("heat = 0.02", "heat = 'much'", "source[0].heat: found 'much', allowed: a number of at most 1e100"),
@@ -278,7 +284,7 @@ def test_times_of_a_picture_share_the_way_evenly():
         ("value = 1.0", "valeu = 1.0", "walls.left.valeu: unknown key, did you mean 'value'? allowed: type, value"),
         ("times = [0.0, 1.0], values", "time = [0.0, 1.0], values", "walls.right.value.time: unknown key, did you"),
         ("values = [0.0, 0.5]", "values = [0.0, 'x']", "walls.right.value.values[1]: found 'x', allowed: a list"),
-        ("gradient = [0.0, 0.2]", "gradient = [0.0]", "material.initial.gradient[1]: missing, expected two numbers"),
+        ("gradient = [0.0, 0.2]", "gradient = [0.0]", "particles.initial.gradient[1]: missing, expected two numbers"),
         ('top = { type = "insulated" }', "top = 5", "walls.top: found 5, allowed: a table such as"),
         ('type = "insulated"', 'type = "insulated", value = 1.0', "walls.top: value: has no meaning with type"),
         ('type = "insulated"', 'type = "insulated", coefficient = 1.0', "walls.top: coefficient: has no meaning"),
@@ -296,8 +302,7 @@ def test_refused_studies(etc_engine, tmp_path, old, new, message):
 
 
 def test_missing_files_and_misplaced_options(etc_engine, tmp_path):
-    text = STUDY.replace("seed = 7\n", 'particles = "none.csv"\nbox = [1.0, 1.0]\n')
-    text = text.replace('[packing]\nradii = "uniform:0.03:0.05"\nbox = [1.0, 1.0]\n', "")
+    text = STUDY.replace('radii = "uniform:0.03:0.05"', 'files = "none.csv"')
     done = etc_engine("transient", write(tmp_path, text), "-o", tmp_path / "out.nc")
     assert "there is no file" in done.stderr
     done = etc_engine("transient", write(tmp_path), "-o", tmp_path / "out.nc", "--vtk", tmp_path / "a.vtp")
@@ -308,7 +313,7 @@ def test_missing_files_and_misplaced_options(etc_engine, tmp_path):
 
 def test_the_uniform_pipe_is_another_system(tmp_path):
     study = parse_study(tomllib.loads(STUDY))
-    uniform = parse_study(tomllib.loads(STUDY.replace('"pipe"', '"pipe"\npipe_resistance = "uniform"')))
+    uniform = parse_study(tomllib.loads(STUDY.replace('"pipe"', '"pipe"\nmethod = "uniform"')))
     chord, other = (run_transient(words, tmp_path).system for words in (study, uniform))
     assert other.heat.conductance.diagonal().max() < chord.heat.conductance.diagonal().max()
 
@@ -324,15 +329,16 @@ def test_a_state_comes_back_from_disk(tmp_path):
 
 DISKS = "x,y,radius\n0.25,0.5,0.25\n0.75,0.5,0.25\n"
 PAIR = """
-schema = 1
+schema = 2
 kind = "network"
 name = "two disks"
-particles = "disks.csv"
+[packing]
+files = "disks.csv"
 box = [1.0, 1.0]
 [contacts]
 rule = "bonded"
 contact_angle = 10.0
-[material]
+[particles]
 heat_capacity = 1.0
 initial = 0.0
 [walls]
@@ -391,7 +397,8 @@ def test_frames_of_another_series_are_kept(etc_engine, pair):
 @pytest.mark.parametrize("coefficient", [1e3, 1e6, 1e15])
 def test_a_firm_convective_wall_keeps_the_digits_of_its_heat(pair, method, coefficient):
     """It tends to a wall of given temperature; over the film alone its heat would be a difference of equals."""
-    content = tomllib.loads(PAIR) | {"conduction": {"method": method}}
+    word = {"engine": "pipe"} if method == "pipe" else {"method": method}
+    content = tomllib.loads(PAIR) | {"conduction": word}
     wall = {"type": "convective", "coefficient": coefficient, "value": 1.0}
     soft = run_transient(parse_study(content | {"walls": {"left": wall}}), pair.parent).states[-1]
     firm = run_transient(parse_study(content), pair.parent).states[-1]
@@ -423,7 +430,7 @@ def test_a_picture_of_a_flat_bed_holds_all_its_words(pair):
     """Of boxes of four to one and flatter the label of the colour bar was cut off."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    content = tomllib.loads(PAIR) | {"box": [8.0, 1.0], "walls": {}}
+    content = tomllib.loads(PAIR) | {"packing": {"files": "disks.csv", "box": [8.0, 1.0]}, "walls": {}}
     series = series_dataset(run_transient(parse_study(content), pair.parent))
     figure = draw_transient(series)
     FigureCanvasAgg(figure).draw()

@@ -30,7 +30,7 @@ from etc_engine.sweep.shards import ShardReader, shard_folder
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
 STUDY = """
-schema = 1
+schema = 2
 name = "kills"
 seed = 271828
 [packing]
@@ -141,7 +141,7 @@ class _Sweep:
         """The bits of all finished units."""
         reader = ShardReader(shard_folder(self.output))
         return {
-            record.unit: b"".join(cell.conductivity.tobytes() for row in record.result.cells for cell in row)
+            record.unit: b"".join(cell.conductivity.tobytes() for cell in record.result.cells)
             for record in reader.read(reader.files())
         }
 

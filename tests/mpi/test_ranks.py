@@ -19,7 +19,7 @@ MPIEXEC = Path(sys.executable).with_name("mpiexec")
 needs_mpi = pytest.mark.skipif(not MPIEXEC.exists(), reason="no mpiexec beside python: install the extra 'mpi'")
 
 STUDY = """
-schema = 1
+schema = 2
 name = "ranks"
 seed = 20261
 [packing]

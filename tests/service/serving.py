@@ -20,7 +20,7 @@ from etc_engine.service.client import Server
 
 HERE = Path(__file__).parent
 SLOW_ENGINE = HERE / "slow_engine.py"
-STUDY = """schema = 1
+STUDY = """schema = 2
 name = "served"
 seed = 271828
 [packing]

@@ -44,7 +44,7 @@ def test_a_study_ends_in_the_bits_of_the_command(real, finished, tmp_path, etc_e
 
 def test_the_same_study_is_answered_from_the_result(real, finished):
     """Neither layout, order, comments nor JSON make it another study."""
-    other = '# mine\nname = "served"\nschema = 1\nseed = 271828\n' + STUDY[STUDY.index("[packing]") :]
+    other = '# mine\nname = "served"\nschema = 2\nseed = 271828\n' + STUDY[STUDY.index("[packing]") :]
     for same in (STUDY, other, tomllib.loads(STUDY)):
         again = client.submit(real.server, same)
         assert (again["id"], again["new"], again["state"]) == (finished["id"], False, "done")
@@ -57,9 +57,10 @@ def test_the_figure_has_the_numbers_of_the_result(real, finished):
     assert curve["complete"]
     statistics = simulated(client.fetch(real.server, finished["id"]))
     assert curve["density"] == [0.55, 0.60]
-    assert [one["contact_angle"] for one in curve["series"]] == [5.0, 10.0]
+    assert [one["values"] for one in curve["series"]] == [{"contact_angle": 5.0}, {"contact_angle": 10.0}]
+    assert [one["name"] for one in curve["series"]] == ["5°", "10°"]
     for one in curve["series"]:
-        cell = statistics.sel(contact_angle=one["contact_angle"])
+        cell = statistics.sel(one["values"])
         for key, name in (
             ("mean", "conductivity_mean"),
             ("low", "conductivity_ci_low"),
@@ -70,8 +71,8 @@ def test_the_figure_has_the_numbers_of_the_result(real, finished):
     assert {"maxwell", "hashin_shtrikman_upper"} <= {model["name"] for model in curve["models"]}
 
 
-COMPOSITE = """schema = 1
-name = "composite"
+FILLED = """schema = 2
+name = "filled"
 seed = 271828
 [packing]
 method = "random-sequential"
@@ -83,23 +84,25 @@ density = [0.1, 0.2]
 [conduction]
 engine = "voxel"
 tolerance = 1e-6
-[composite]
-contrast = [2.0, 10.0]
 resolution = 40
+[particles]
+conductivity = [2.0, 10.0]
+[pores]
+conductivity = 1.0
 [statistics]
 realizations = 2
 """
 
 
-def test_a_composite_is_swept_over_contrasts(real):
-    study = client.submit(real.server, COMPOSITE)["id"]
+def test_pores_that_conduct_are_swept_over_conductivities(real):
+    study = client.submit(real.server, FILLED)["id"]
     ended = client.wait(real.server, study, interval=0.05)
     assert ended["state"] == "done", ended
     curve = json.loads(ask(f"{real.url}/api/studies/{study}/curve")[2])
     statistics = simulated(client.fetch(real.server, study))
-    assert [one["contrast"] for one in curve["series"]] == [2.0, 10.0]
+    assert [one["values"] for one in curve["series"]] == [{"particle_conductivity": k} for k in (2.0, 10.0)]
     for one in curve["series"]:
-        np.testing.assert_array_equal(one["mean"], statistics["conductivity_mean"].sel(contrast=one["contrast"]).values)
+        np.testing.assert_array_equal(one["mean"], statistics["conductivity_mean"].sel(one["values"]).values)
     maxwell = next(model for model in curve["models"] if model["name"] == "maxwell")
     assert len(maxwell["curves"]) == 2
     for values, contrast in zip(maxwell["curves"], (2.0, 10.0), strict=True):
@@ -245,7 +248,7 @@ def test_refused_json(service, body):
 @pytest.mark.parametrize(
     ("path", "body", "words"),
     [
-        ("/api/studies", b'{"schema": 1, "schema": 1}', "study: the key 'schema' is given twice"),
+        ("/api/studies", b'{"schema": 2, "schema": 2}', "study: the key 'schema' is given twice"),
         ("/api/studies", b'{"packing": {"count": 1, "count": 2}}', "study: the key 'count' is given twice"),
         ("/api/models/maxwell", b'{"k1": 1.0, "k1": 2.0}', "the key 'k1' is given twice"),
         ("/api/models/maxwell", b'{"k1": }', "the body is not valid JSON: Expecting value at character 7; expected"),
@@ -261,8 +264,8 @@ def test_what_is_no_good_json_is_told_plainly(service, path, body, words):
 
 
 def test_true_is_no_number_of_a_schema(service):
-    for word, expected in (("true", 422), ("1", 200)):
-        text = STUDY.replace("schema = 1", f"schema = {word}")
+    for word, expected in (("true", 422), ("1", 422), ("2", 200)):
+        text = STUDY.replace("schema = 2", f"schema = {word}")
         status, _, body = ask(f"{service.url}/api/studies/check", "POST", text.encode())
         assert status == expected, body
     assert json.loads(ask(f"{service.url}/api/studies/check", "POST", text.encode())[2])["name"] == "served"

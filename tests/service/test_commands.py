@@ -113,7 +113,7 @@ def test_a_line_of_status():
 )
 def test_refusals_are_one_line(service, tmp_path, monkeypatch, etc_engine, arguments, words):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.toml").write_text('schema = 1\nname = "x"\nseed = 7\n[statistics]\nrealizations = 2\n')
+    (tmp_path / "bad.toml").write_text('schema = 2\nname = "x"\nseed = 7\n[statistics]\nrealizations = 2\n')
     (tmp_path / "good.toml").write_text(STUDY)
     (tmp_path / "large.toml").write_text(STUDY.replace("realizations = 3", "realizations = 100000"))
     before = sorted(path.name for path in tmp_path.iterdir())

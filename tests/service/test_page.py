@@ -111,7 +111,7 @@ def test_nothing_hangs_over_and_everything_has_a_name(slow, browser, width, sche
 
 
 def test_the_form_follows_the_engine(slow, browser):
-    """A composite has a matrix and no contacts; what has no meaning is neither shown nor sent."""
+    """An engine of the whole cell has no contacts; what has no meaning is neither shown nor sent."""
     shown = "return [...document.querySelectorAll('.field')].filter(f => f.offsetParent).map(f => f.dataset.field)"
     choose = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))"
     browser.open("about:blank")
@@ -120,14 +120,16 @@ def test_the_form_follows_the_engine(slow, browser):
     for field, word in (("packing.method", "lubachevsky-stillinger"), ("conduction.engine", "voxel")):
         browser.run(choose, {ELEMENT: browser.find(written(field))}, word)
     fields = browser.run(shown)
-    assert {"composite.contrast", "composite.resolution"} <= set(fields)
-    assert not any(field.startswith("contacts.") or field == "composite.nodes" for field in fields)
+    assert {"pores.conductivity", "conduction.resolution"} <= set(fields)
+    assert not any(field.startswith("contacts.") or field == "conduction.particles" for field in fields)
+    browser.write(written("particles.conductivity"), "10")
+    browser.write(written("pores.conductivity"), "1")
     browser.write(written("packing.periodic"), "xy")
     browser.write(written("packing.radii"), "equal:0.05")
     browser.write(written("packing.density"), "0.2, 0.3")
-    browser.write(written("composite.resolution"), "2")
-    assert "at least 4" in problem_beside(browser, "composite.resolution")
-    browser.write(written("composite.resolution"), "40")
+    browser.write(written("conduction.resolution"), "2")
+    assert "at least" in problem_beside(browser, "conduction.resolution")
+    browser.write(written("conduction.resolution"), "40")
     browser.write(written("models.names"), "maxwell")
     browser.until("return document.getElementById('size').innerText.startsWith('40 packings, 40 results')")
 
@@ -166,9 +168,7 @@ def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
         "low": [0.9, 1.9],
         "high": [1.1, 2.1],
         "count": [3, 3],
-        "contact_angle": 5.0,
-        "contrast": None,
-        "method": None,
+        "name": "5°",
     }
     models = [
         {"name": name, "title": name, "density": [0.5, 0.6], "curves": [values]}
@@ -180,7 +180,7 @@ def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
         )
     ]
     curve = {"confidence": 0.95, "density": [0.5, 0.6], "series": [{"mean": [1.0, 2.0], **flat}], "models": models}
-    series = "contact half-angle 5°"
+    series = "5°"
     assert browser.run(DRAW, curve, [])[0] == [series]
     assert max(browser.run(DRAW, curve, [])[1]) < 3
     legend, ticks = browser.run(DRAW, curve, ["near", "far", "steep"])
@@ -216,17 +216,17 @@ def test_a_single_solve_and_a_model(slow, browser, tmp_path):
     expected = client.solve(slow.server, (tmp_path / "disks.csv").read_bytes(), box="1,1")["conductivity"]
     assert float(shown) == pytest.approx(expected, rel=1e-7)
     choose = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change', {bubbles: true}))"
-    for field, word in (("#method", "pipe"), ("#pipe_resistance", "uniform")):
+    for field, word in (("#engine", "pipe"), ("#method", "uniform")):
         browser.run(choose, {ELEMENT: browser.find(field)}, word)
     browser.click("main button.main")
-    pipe = {"box": "1,1", "method": "pipe", "pipe_resistance": "uniform"}
+    pipe = {"box": "1,1", "engine": "pipe", "method": "uniform"}
     expected = client.solve(slow.server, (tmp_path / "disks.csv").read_bytes(), **pipe)["conductivity"]
     shown = browser.until(
         "const d = document.querySelector('dd')?.innerText; return d === arguments[0] ? null : d", shown
     )
     assert float(shown) == pytest.approx(expected, rel=1e-7)
     browser.choose_file("#file", written_dump(tmp_path / "disks.dump"))
-    browser.run(choose, {ELEMENT: browser.find("#method")}, "chord")
+    browser.run(choose, {ELEMENT: browser.find("#engine")}, "dtem")
     browser.write("#box", "")
     browser.click("main button.main")
     browser.until("const d = document.querySelector('dd')?.innerText; return d && d !== arguments[0]", shown)

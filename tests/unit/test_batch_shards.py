@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from etc_engine.box import Box
 from etc_engine.durable.files import write_atomically
 from etc_engine.errors import OutputError
+from etc_engine.medium.conduction import Conduction
 from etc_engine.packing import PackingSpec, parse_radii
-from etc_engine.realization import ConductionSpec, ContactSpec, Outcome, Realization, RealizationSpec, Status
+from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
 from etc_engine.study.sweep import parse_study
 from etc_engine.sweep import gathering
 from etc_engine.sweep.plan import Unit
@@ -25,12 +26,12 @@ from etc_engine.sweep.table import join, tabulate
 
 def record(realization: int, value: float = 0.3, message: str = "") -> Record:
     cell = Outcome(Status.OK, message, np.array([[value, np.nan], [np.nan, -value]]), 5, 2, 3.3, 7, 9, 1e-12, 0.5)
-    result = Realization(11, 0.7, 0.69, 0.25, ((cell, cell), (cell, cell)))
+    result = Realization(11, 0.7, 0.69, 0.25, (cell, cell, cell, cell))
     return Record(Unit(0.7, realization), result, 3, "node", 1.5, 2.5)
 
 
 STUDY = parse_study("""
-schema = 1
+schema = 2
 name = "shards"
 seed = 20261
 [packing]
@@ -53,8 +54,7 @@ def read(folder) -> list[Record]:
 
 
 def bits(found: Record) -> bytes:
-    cells = [cell for row in found.result.cells for cell in row]
-    return b"".join(cell.conductivity.tobytes() for cell in cells)
+    return b"".join(cell.conductivity.tobytes() for cell in found.result.cells)
 
 
 @settings(max_examples=100, deadline=None)
@@ -66,25 +66,25 @@ def test_a_record_keeps_every_bit(value, message):
     back = decode(line)
     assert bits(back) == bits(there)
     assert encode(back) == line
-    assert back.result.cells[1][0].message == message
+    assert back.result.cells[2].message == message
 
 
 def test_numpy_numbers_of_an_engine_become_plain():
     cell = Outcome(Status.OK, conductivity=np.eye(2), contacts=np.int64(3), coordination=np.float64(1.5))
-    there = Record(Unit(None, 0), Realization(np.int64(2), 0.5, 0.5, 0.0, ((cell,),)), 0, "node", 0.0, 0.0)
+    there = Record(Unit(None, 0), Realization(np.int64(2), 0.5, 0.5, 0.0, (cell,)), 0, "node", 0.0, 0.0)
     back = decode(encode(there))
     assert back.unit == Unit(None, 0)
-    assert back.result.cells[0][0].contacts == 3
+    assert back.result.cells[0].contacts == 3
 
 
 def test_an_exception_becomes_a_steady_one_line_message():
-    contacts = ContactSpec("bonded", (0.1, 0.2))
     packing = PackingSpec("advancing-front", parse_radii("equal:0.05"), Box((1.0, 1.0)))
-    two_angles = RealizationSpec(packing, contacts, ConductionSpec(methods=("chord", "standard", "enhanced")))
-    result = failed_realization(ValueError(f"bad\nthing {object()!r}"), two_angles, 2)
-    assert [len(row) for row in result.cells] == [3, 3]
-    assert {cell.status for row in result.cells for cell in row} == {Status.ERROR}
-    assert result.cells[0][0].message == "ValueError: bad thing <object object at 0x...>"
+    methods = tuple(Conduction("dtem", method) for method in ("chord", "standard", "enhanced"))
+    two_angles = RealizationSpec(packing, "bonded", methods, axes={"contact_angle": (0.1, 0.2)})
+    result = failed_realization(ValueError(f"bad\nthing {object()!r}"), two_angles)
+    assert len(result.cells) == 6
+    assert {cell.status for cell in result.cells} == {Status.ERROR}
+    assert result.cells[0].message == "ValueError: bad thing <object object at 0x...>"
 
 
 def test_what_is_written_is_read_from_many_ranks_and_in_pieces(tmp_path):
@@ -158,7 +158,7 @@ def test_a_table_holds_what_the_records_say():
     assert table.units.tolist() == [[0, 0], [0, 2]]
     assert table.rows["conductivity"][:, 1, 0, 1, 1].tolist() == [-0.5, -0.25]
     assert table.rows["worker_host"].tolist() == ["node", "node"]
-    assert set(table.messages) == {(0, 2, a, m) for a in (0, 1) for m in (0, 1)}
+    assert set(table.messages) == {(0, 2, place) for place in range(4)}
 
 
 def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ from etc_engine.errors import StudyError
 from etc_engine.study.sweep import parse_study, read_study
 
 STUDY = """
-schema = 1
+schema = 2
 name = "small"
 seed = 20261
 [packing]
@@ -31,8 +31,8 @@ realizations = 3
 def test_defaults_and_order():
     study = parse_study(STUDY)
     assert study.densities == (0.65, 0.75)
-    assert study.contacts.contact_angle == (2.5, 10.0)
-    assert study.conduction.methods == ("chord",)
+    assert study.axes == {"contact_angle": (2.5, 10.0)}
+    assert study.methods == ("chord",)
     assert study.statistics.cap == 3
     assert study.statistics.confidence == 0.95
     assert study.packing.method == "advancing-front"
@@ -42,9 +42,11 @@ def test_conversion_to_a_realization():
     spec = parse_study(STUDY).realization_spec(0.65)
     assert spec.packing.density == 0.65
     assert spec.packing.box.lengths == (1.0, 1.0)
-    assert spec.contacts.rule == "bonded"
-    assert spec.contacts.contact_angles == (math.radians(2.5), math.radians(10.0))
-    assert spec.conduction.methods == ("chord",)
+    assert spec.rule == "bonded"
+    assert spec.axes == {"contact_angle": (math.radians(2.5), math.radians(10.0))}
+    assert spec.values["particle_conductivity"] == 1.0
+    assert spec.shape == (2, 1)
+    assert [one.method for one in spec.conduction] == ["chord"]
 
 
 def test_one_number_stands_for_a_list_of_one():
@@ -70,7 +72,7 @@ def test_without_density_the_packer_decides():
         ("[10.0, 2.5]", "[90]", ("contacts.contact_angle[0]", "found 90", "between 0 and 90")),
         ("contact_angle = [10.0, 2.5]", "", ("contacts", "bonded", "contact_angle")),
         ('"bonded"', '"overlap"', ("contacts", "contact_angle", "overlap")),
-        ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded or coordination")),
+        ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded, coordination")),
         ("[statistics]", '[conduction]\nmethod = "cord"\n[statistics]', ("method", "found 'cord'", "chord")),
         (
             "[statistics]",
@@ -81,7 +83,7 @@ def test_without_density_the_packer_decides():
         (
             "[statistics]",
             '[conduction]\npipe_resistance = "chord"\n[statistics]',
-            ("conduction.pipe_resistance: unknown key", "engine = 'pipe' has method = 'chord' or 'uniform'"),
+            ("conduction.pipe_resistance: unknown key", "write engine = 'pipe' with method = 'chord' or 'uniform'"),
         ),
         ("[statistics]", '[conduction]\nengine = "fem"\n[statistics]', ("conduction.engine", "found 'fem'", "dtem")),
         ("realizations = 3", "realizations = 0", ("statistics.realizations", "found 0", "at least 1")),
@@ -96,16 +98,15 @@ def test_without_density_the_packer_decides():
         ),
         ("realizations = 3", "realizations = 1\nrelative_ci = 0.1", ("realizations = 1", "at least 2")),
         ("seed = 20261", "seed = -1", ("seed", "found -1", "from 0")),
-        ("schema = 1", "schema = 2", ("schema", "found 2", "allowed: 1")),
+        ("schema = 2", "schema = 3", ("schema", "found 3", "allowed: 2")),
         ("box = [1.0, 1.0]", "box = [1.0]", ("packing.box", "two or three")),
-        ("box = [1.0, 1.0]", "box = [1.0, 1.0, 1.0]", ("packing.box", "2D")),
         ("box =", 'periodic = "xq"\nbox =', ("periodic", "'xq'")),
         ("uniform:0.01:0.02", "triangle:0.01", ("packing", "radii", "triangle:0.01")),
         ("box =", "growth_rate = 0.1\nbox =", ("packing", "growth_rate", "advancing-front")),
         ("box =", "count = 100\nbox =", ("packing", "count", "advancing-front")),
         ("uniform:0.01:0.02", "equal", ("packing", "radii", "equal:0.01")),
         ("[statistics]", '[models]\nnames = ["maxwel"]\n[statistics]', ("models", "maxwel", "did you mean maxwell")),
-        ("schema = 1", "schema = = 1", ("not valid TOML", "line 2")),
+        ("schema = 2", "schema = = 2", ("not valid TOML", "line 2")),
     ],
 )
 def test_mistakes_are_one_line_with_key_found_and_allowed(found, replacement, words):
@@ -173,5 +174,5 @@ def test_what_the_toml_reader_cannot_hold_is_refused(text):
 
 
 def test_true_is_no_number_of_a_schema():
-    with pytest.raises(StudyError, match="schema: found 'true', allowed: 1"):
-        parse_study(STUDY.replace("schema = 1", "schema = true"))
+    with pytest.raises(StudyError, match="schema: found true, allowed: 2"):
+        parse_study(STUDY.replace("schema = 2", "schema = true"))

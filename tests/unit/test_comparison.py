@@ -7,14 +7,14 @@ import pytest
 import xarray
 from scipy import stats
 
-from etc_engine.comparison import Phases, evaluate_models, fit_models, model_curve, phases
+from etc_engine.comparison import evaluate_models, fit_models, model_curve, phases
 from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import InputError
 from etc_engine.models import evaluate
 from etc_engine.models.filled_polymers import agari_uno, lewis_nielsen
 
 OVERLAP = """
-schema = 1
+schema = 2
 name = "made"
 seed = 20263
 [packing]
@@ -23,14 +23,14 @@ box = [1.0, 1.0]
 density = [0.5, 0.6, 0.7, 0.8, 0.9]
 [contacts]
 rule = "overlap"
-[conduction]
+[particles]
 conductivity = 2.0
 [statistics]
 realizations = 4
 confidence = 0.9
 """
 BONDED = OVERLAP.replace('rule = "overlap"', 'rule = "bonded"\ncontact_angle = [5.0, 10.0]')
-CONDUCTING_PORES = OVERLAP + "[models]\npore_conductivity = 0.2\n"
+CONDUCTING_PORES = OVERLAP + "[pores]\nconductivity = 0.2\n[conduction]\nengine = 'voxel'\n"
 
 
 def noisy(density, angle, method, realization):
@@ -182,9 +182,10 @@ def test_refusals(made_sweep):
 
 
 def test_phases_come_from_the_study(made_sweep):
-    assert phases(made_sweep(CONDUCTING_PORES, noisy)) == (Phases(0.2, 2.0, 2, True),)
-    assert phases(made_sweep(BONDED, noisy)) == (Phases(0.0, 2.0, 2, False),)
-    values, note = model_curve("maxwell", Phases(0.2, 2.0, 2, True), np.array([0.3, np.nan]))
+    filled, bonded = (phases(made_sweep(text, noisy)) for text in (CONDUCTING_PORES, BONDED))
+    assert (float(filled.pores), float(filled.particles), filled.dimension, filled.bounds_bind) == (0.2, 2.0, 2, True)
+    assert (float(bonded.pores), bonded.pores_conduct, bonded.bounds_bind) == (0.0, False, False)
+    values, note = model_curve("maxwell", filled, xarray.DataArray([0.3, np.nan], dims="density"))
     assert values[0] == pytest.approx(evaluate("maxwell", k1=0.2, k2=2.0, fraction=0.3, dimension=2), rel=1e-14)
     assert np.isnan(values[1])
     assert note == ""

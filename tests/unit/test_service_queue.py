@@ -19,7 +19,7 @@ from etc_engine.service.queue import Queue
 from etc_engine.service.settings import Limits
 from etc_engine.study.sweep import parse_study
 
-STUDY = """schema = 1
+STUDY = """schema = 2
 name = "queued"
 seed = 271828
 [packing]
@@ -138,11 +138,12 @@ def test_limits_are_met_before_anything_runs():
 def test_voxels_and_lattices_are_counted_too():
     composite = STUDY.replace("[packing]", '[packing]\nmethod = "lubachevsky-stillinger"\nperiodic = "xy"')
     composite = composite.replace("[0.55, 0.60]", "[0.3]").replace("uniform:0.03:0.06", "equal:0.05")
-    composite += '[conduction]\nengine = "voxel"\n[composite]\ncontrast = [2.0, 10.0]\nresolution = {}\n'
+    composite += "[particles]\nconductivity = [2.0, 10.0]\n[pores]\nconductivity = 1.0\n"
+    composite += '[conduction]\nengine = "voxel"\nresolution = {}\n'
     assert apply(composite.format(64), Limits()).cells == 6
-    with pytest.raises(StudyError, match=r"composite: takes about \d+ MB") as caught:
+    with pytest.raises(StudyError, match=r"conduction: takes about \d+ MB") as caught:
         apply(composite.format(10_000), Limits())
-    assert field_of(str(caught.value)) == "composite"
+    assert field_of(str(caught.value)) == "conduction"
 
 
 def test_expected_particles_are_box_over_particle():
@@ -161,7 +162,7 @@ def test_expected_particles_are_box_over_particle():
         ("study: models: names: there is no model named 'x'; there are: a", "models.names"),
         ("study: conduction: method: found 'x', allowed with dtem: chord", "conduction.method"),
         ("study: contacts: rule = 'bonded' needs contact_angle, a list of half-angles in degrees", "contacts"),
-        ("study: composite.resolution: found 1, allowed: a whole number of at least 4", "composite.resolution"),
+        ("study: conduction.resolution: found 1, allowed: a whole number of at least 4", "conduction.resolution"),
         ("study: expected a JSON object, found list", ""),
     ],
 )

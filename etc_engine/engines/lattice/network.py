@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.rules import closest_neighbors
+from etc_engine.medium.touching import closest_neighbors
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.laguerre import laguerre_facets
 

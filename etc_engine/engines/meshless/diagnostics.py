@@ -64,7 +64,7 @@ class Diagnostics:
             return
         message = (
             f"time marching is unstable: the spectral radius of a step is {radius:.6g} with "
-            f"{layout.functions} functions on {layout.collocation.count} boundary nodes; use fewer "
+            f"{layout.columns} functions on {layout.collocation.count} boundary nodes; use fewer "
             'functions, splines of lower order, more nodes or longer steps, or method="mfs"'
         )
         if growth > GROWTH_REFUSED and not layout.discretization.allow_unstable:
@@ -89,21 +89,24 @@ class Diagnostics:
         }
 
 
-def note_corner_jumps(problem: HeatProblem, diagnostics: Diagnostics) -> None:
-    """Warn where two prescribed temperatures disagree at their common corner."""
+def note_corner_jumps(problem: HeatProblem, diagnostics: Diagnostics) -> list[int]:
+    """Warn where two prescribed temperatures disagree at their common corner; returns those vertices."""
+    jumps: list[int] = []
     if not isinstance(problem.domain, Polygon):
-        return
+        return jumps
     for vertex, corner in enumerate(problem.domain.corners):
         pair = problem.boundary[vertex - 1], problem.boundary[vertex]
         if not all(isinstance(condition, Dirichlet) for condition in pair):
             continue
         before, after = (float(condition.sample(corner[None, :], 0.0)[0]) for condition in pair)
         if abs(before - after) > 1e-9 * max(abs(before), abs(after)):
+            jumps.append(vertex)
             diagnostics.warn(
                 f"prescribed temperatures jump from {before:g} to {after:g} at vertex {vertex}: no smooth "
                 "field meets both, so values within a node spacing of that corner are not to be trusted (no "
                 "boundary node is set there)"
             )
+    return jumps
 
 
 def temperature_span(layout: Layout, readings: list[Observation]) -> float:
@@ -115,7 +118,12 @@ def temperature_span(layout: Layout, readings: list[Observation]) -> float:
 
 
 def judge(layout: Layout, readings: list[Observation], residuals: Array, diagnostics: Diagnostics) -> None:
-    """Refuse fields that are not finite; warn about figures outside what was tried and found good."""
+    """Refuse fields that are not finite or miss their boundary; warn about figures outside what was tried.
+
+    Raises
+    ------
+    ConvergenceError
+    """
     if not all(np.isfinite(reading.temperature).all() for reading in readings):
         raise ConvergenceError("the temperature is not finite: use fewer functions or longer time steps")
     spacings = diagnostics.lambda_spacing
@@ -126,9 +134,9 @@ def judge(layout: Layout, readings: list[Observation], residuals: Array, diagnos
             f"lambda times the node spacing runs from {min(spacings):.3g} to {max(spacings):.3g}, outside "
             f"the stable range {low} to {high}: use {cure}"
         )
-    if spacings and diagnostics.boundary_rank < layout.functions:
+    if spacings and diagnostics.boundary_rank < layout.columns - layout.clustered:
         diagnostics.warn(
-            f"the boundary system has rank {diagnostics.boundary_rank} of {layout.functions}: the remaining "
+            f"the boundary system has rank {diagnostics.boundary_rank} of {layout.columns}: the remaining "
             "singular values were cut off; use fewer functions or sources closer to the boundary"
         )
     if diagnostics.interpolation_condition > CONDITION_LIMIT:
@@ -138,7 +146,8 @@ def judge(layout: Layout, readings: list[Observation], residuals: Array, diagnos
         )
     worst = np.nanmax(residuals, initial=0.0)
     if worst > layout.discretization.residual_limit:
-        diagnostics.warn(
-            f"the boundary conditions are missed by up to {100.0 * worst:.2g} % of the temperature span "
-            "between the boundary nodes: use more boundary nodes and functions"
+        raise ConvergenceError(
+            f"the boundary conditions are missed by up to {100.0 * worst:.2g} % of the temperature span between the "
+            f"boundary nodes, more than {100.0 * layout.discretization.residual_limit:.2g} %: use more boundary nodes "
+            "and functions, or accept it by a larger residual_limit"
         )

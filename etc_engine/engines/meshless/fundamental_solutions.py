@@ -15,7 +15,7 @@ Field = NDArray
 #: A source closer to the body than this part of the wanted offset is left out (re-entrant corners).
 CROWDED = 0.6
 #: A source closer to the boundary than this part of the domain radius counts as lying on it.
-ON_BOUNDARY = 1e-6
+ON_BOUNDARY = 1e-7
 
 
 def fundamental_solutions(points: Array, sources: Array, nearest: Array, lam: complex) -> tuple[Field, Field, Field]:

@@ -66,16 +66,16 @@ class HelmholtzOperator:
 
     def value_rows(self, points: Array) -> Field:
         """Rows that give u at scaled positions, shape (k, coefficients)."""
-        return np.hstack(_values(self.layout, self.lam, points))
+        return np.hstack(_values(self.layout, self.lam, points, self.interpolation))
 
     def gradient_rows(self, points: Array) -> tuple[Field, Field]:
         """Rows that give du/dx and du/dy (per metre) at scaled positions."""
-        x, y = (np.hstack(parts) for parts in _gradients(self.layout, self.lam, points))
+        x, y = (np.hstack(parts) for parts in _gradients(self.layout, self.lam, points, self.interpolation))
         return x / self.layout.scale, y / self.layout.scale
 
     def residual_rows(self, where: BoundaryNodes) -> Field:
         """Rows that give B1 u + B2 du/dn at boundary nodes."""
-        return np.hstack(boundary_rows(self.layout, self.lam, where))
+        return np.hstack(boundary_rows(self.layout, self.lam, where, self.interpolation))
 
 
 def prepare_operator(layout: Layout, lam: complex, interpolation: SourceInterpolation) -> HelmholtzOperator:
@@ -86,9 +86,10 @@ def prepare_operator(layout: Layout, lam: complex, interpolation: SourceInterpol
     ConvergenceError
         If the boundary system holds values that are not finite or no singular value is usable.
     """
-    particular, matrix = boundary_rows(layout, lam, layout.collocation)
+    particular, matrix = boundary_rows(layout, lam, layout.collocation, interpolation)
     b1, b2 = layout.boundary_coefficients(layout.collocation.edges)
-    row_scale = np.abs(b1) + np.abs(b2) * (1.0 + abs(lam))
+    # a flux grows like r^(nu - 1) towards a corner: weighted by r it does not outweigh all other rows
+    row_scale = np.abs(b1) + np.abs(b2) * (1.0 + abs(lam)) / layout.nearness
     matrix = matrix / row_scale[:, None]
     if not np.isfinite(matrix).all():
         raise ConvergenceError(
@@ -105,12 +106,14 @@ def prepare_operator(layout: Layout, lam: complex, interpolation: SourceInterpol
     return HelmholtzOperator(layout, lam, interpolation, particular, fit)
 
 
-def boundary_rows(layout: Layout, lam: complex, where: BoundaryNodes) -> tuple[Field, Field]:
+def boundary_rows(
+    layout: Layout, lam: complex, where: BoundaryNodes, interpolation: SourceInterpolation
+) -> tuple[Field, Field]:
     """Rows of B1 u + B2 du/dn for the particular and for the homogeneous functions."""
     b1, b2 = layout.boundary_coefficients(where.edges)
     points = layout.scaled(where.points)
-    values = _values(layout, lam, points)
-    (xp, xh), (yp, yh) = _gradients(layout, lam, points)
+    values = _values(layout, lam, points, interpolation)
+    (xp, xh), (yp, yh) = _gradients(layout, lam, points, interpolation)
     nx, ny = where.normals[:, :1], where.normals[:, 1:]
     normal = (nx * xp + ny * yp, nx * xh + ny * yh)
     particular, homogeneous = (b1[:, None] * v + b2[:, None] * d for v, d in zip(values, normal, strict=True))
@@ -122,23 +125,25 @@ def _reach(layout: Layout) -> float:
     return 2.0 * layout.radius / layout.scale
 
 
-def _values(layout: Layout, lam: complex, points: Array) -> tuple[Field, Field]:
-    nodes = layout.scaled(layout.nodes)
-    particular = particular_values(layout.discretization.basis, nodes, points, lam, _reach(layout))
+def _values(layout: Layout, lam: complex, points: Array, interpolation: SourceInterpolation) -> tuple[Field, Field]:
+    particular = particular_values(interpolation, points, lam, _reach(layout))
     return particular, _homogeneous(layout, lam, points)[0]
 
 
-def _gradients(layout: Layout, lam: complex, points: Array) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
-    nodes = layout.scaled(layout.nodes)
-    xp, yp = particular_gradients(layout.discretization.basis, nodes, points, lam, _reach(layout))
+def _gradients(
+    layout: Layout, lam: complex, points: Array, interpolation: SourceInterpolation
+) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
+    xp, yp = particular_gradients(interpolation, points, lam, _reach(layout))
     _, xh, yh = _homogeneous(layout, lam, points)
     return (xp, xh), (yp, yh)
 
 
 def _homogeneous(layout: Layout, lam: complex, points: Array) -> tuple[Field, Field, Field]:
-    if layout.sources is None or layout.clearance is None:
-        stretch = layout.radius / layout.scale  # Trefftz functions are scaled to one on the domain radius
-        value, x, y = trefftz_functions(points / stretch, lam * stretch, layout.functions)
-        return value, x / stretch, y / stretch
+    """Values and gradients of the Trefftz functions, then of the fundamental solutions."""
     sources = layout.scaled(layout.sources)
-    return fundamental_solutions(points, sources, layout.clearance / layout.scale, lam)
+    value, x, y = fundamental_solutions(points, sources, layout.clearance / layout.scale, lam)
+    if not layout.functions:
+        return value, x, y
+    stretch = layout.radius / layout.scale  # Trefftz functions are scaled to one on the domain radius
+    smooth, along_x, along_y = trefftz_functions(points / stretch, lam * stretch, layout.functions)
+    return np.hstack([smooth, value]), np.hstack([along_x / stretch, x]), np.hstack([along_y / stretch, y])

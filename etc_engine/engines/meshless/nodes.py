@@ -43,6 +43,14 @@ class BoundaryNodes:
         """Number of points."""
         return len(self.points)
 
+    def joined(self, other: BoundaryNodes) -> BoundaryNodes:
+        """These nodes and then the others."""
+        return BoundaryNodes(
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.normals, other.normals]),
+            np.concatenate([self.edges, other.edges]),
+        )
+
 
 def boundary_nodes(domain: Domain, count: int, spacing: Spacing = "chebyshev") -> BoundaryNodes:
     """About ``count`` nodes shared over the edges by length; no node sits on a corner.

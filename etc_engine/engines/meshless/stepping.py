@@ -84,7 +84,7 @@ class StepLibrary:
         nodes = self.layout.scaled(self.layout.nodes)
         interpolation = self.interpolation
         if interpolation is None or basis.depends_on_lambda:
-            interpolation = interpolate_source(basis, nodes, lam)
+            interpolation = interpolate_source(basis, nodes, lam, self.layout.wedges)
         self.interpolation = interpolation
         operator = prepare_operator(self.layout, lam, interpolation)
         values = operator.value_rows(nodes)

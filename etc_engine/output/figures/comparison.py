@@ -1,4 +1,4 @@
-"""The main figure: simulated conductivity against density or contact angle, with models as thin lines."""
+"""The main figure: simulated conductivity against density or another dimension, with models as thin lines."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, save, spread, style
+from etc_engine.study.quantities import QUANTITIES, SWEPT, heading_of, word_of
+from etc_engine.sweep.table import MEASURES
 
 if TYPE_CHECKING:
     import xarray
@@ -21,16 +23,14 @@ if TYPE_CHECKING:
 MEAN_FIELD = "contact_mean_field"
 
 MARGIN = 0.25
-"""Room above and below the simulated values of composites, over their range, for the model lines about them."""
+"""Room above and below the simulated values of cells with pores that conduct, over their range, for model lines."""
+
+DENSITY = "density (particle {measure} over box {measure}) [-]"
 
 DECADES = 1.3
 """A logarithmic axis is used when the simulated values span more than this many decades."""
 
-VARIANTS = {
-    "contact_angle": "contact half-angle [degree]",
-    "contrast": "conductivity of the particles over that of the matrix [-]",
-}
-"""Labels of the second axis of a sweep."""
+MOST_PANELS = 12
 
 BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones"
 
@@ -52,11 +52,12 @@ SHORT = {
 
 @dataclass(frozen=True)
 class _Axis:
-    """The horizontal axis: a dimension of the sweep, and the one whose values have a curve each."""
+    """The dimensions of a sweep that are the horizontal axis, the curves and the panels."""
 
     dim: str
     label: str
     curves: str | None
+    panels: tuple[str, ...]
 
 
 def save_comparison(comparison: xarray.Dataset, lines: xarray.Dataset, path: Path | str) -> None:
@@ -65,7 +66,7 @@ def save_comparison(comparison: xarray.Dataset, lines: xarray.Dataset, path: Pat
 
 
 def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure:
-    """Mean conductivity with its confidence band, a curve for each contact angle, and the models.
+    """Mean conductivity with its confidence band, a curve per value of one dimension, and the models.
 
     Parameters
     ----------
@@ -77,10 +78,12 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
     Returns
     -------
     matplotlib.figure.Figure
-        One panel a method; if the sweep has one density and several angles, one panel against the angle.
+        Against the density, or with one density against the first dimension of several values. One panel per method
+        and per conductivity of pores or particles, whose models differ; at most `MOST_PANELS`.
     """
     axis = _axis(comparison)
-    panels = _panels(comparison, axis)
+    every = _panels(comparison, axis)
+    panels = every[:MOST_PANELS]
     columns = 2 if len(panels) == 4 else min(len(panels), 3)
     rows = -(-len(panels) // columns)
     figure = new_figure(2.2 + 4.6 * columns, 0.8 + 4.0 * rows)
@@ -90,7 +93,7 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
         style(axes)
         if logarithmic:
             axes.set_yscale("log")
-        if axis.dim in VARIANTS and _is_wide(part[axis.dim].values):
+        if axis.dim != "density" and _is_wide(part[axis.dim].values) and float(part[axis.dim].min()) > 0.0:
             axes.set_xscale("log")
         _draw_simulation(axes, part, axis)
         _draw_models(axes, part, lines, axis)
@@ -105,19 +108,19 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
             axes.set_xlabel("")
     for axes in grid[:, 0]:
         axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
-    # the models of a contrast are its own; others are the same in a whole row
-    own = bool(comparison.attrs["composite"]) and axis.dim != "contrast" and "contrast" in comparison.dims
+    own = any(dim in _model_dims(comparison) for dim in axis.panels)  # otherwise the models are those of the whole row
     for i, (axes, (_, part)) in enumerate(zip(grid.flat, panels, strict=False)):
         if own or i == min(len(panels), (i // columns + 1) * columns) - 1:
             _label_models(axes, part, lines, axis)
     _legend(figure, panels[0][1], axis)
-    figure.supxlabel(_notes(comparison), fontsize=7.5, color="#555555")
+    hidden = f"\nThe first {len(panels)} of {len(every)} panels." if len(every) > len(panels) else ""
+    figure.supxlabel(_notes(comparison) + hidden, fontsize=7.5, color="#555555")
     return figure
 
 
 def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
-    """Limits of the conductivity: from 0 for networks, about the simulated values for composites."""
-    if not comparison.attrs["composite"]:
+    """Limits of the conductivity: from 0, or about the simulated values where the pores conduct too."""
+    if not comparison.attrs["pores_conduct"]:
         return 0.0, None
     names = ("conductivity_mean", "conductivity_ci_low", "conductivity_ci_high")
     values = np.concatenate([comparison[name].values.ravel() for name in names])
@@ -129,34 +132,40 @@ def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
     return low - margin, high + margin
 
 
+def _model_dims(comparison: xarray.Dataset) -> tuple[str, ...]:
+    """Dimensions, besides the density, on which the models depend."""
+    pores, particles = comparison["pore_conductivity"], comparison["particle_conductivity"]
+    return tuple(dict.fromkeys(str(dim) for dim in (*pores.dims, *particles.dims)))
+
+
 def _axis(comparison: xarray.Dataset) -> _Axis:
-    """The density, or with one density the angle or contrast. Each contrast has a panel, because its models differ."""
-    methods = "method" if "method" in comparison.dims else None
-    for variant, label in VARIANTS.items():
-        if comparison.sizes["density"] == 1 and comparison.sizes.get(variant, 1) > 1:
-            return _Axis(variant, label, methods)
-    if comparison.attrs["composite"]:
-        return _Axis("density", "volume fraction of the particles [-]", methods)
-    return _Axis(
-        "density",
-        "density (particle area over box area) [-]",
-        "contact_angle" if "contact_angle" in comparison.dims else None,
-    )
+    """What stands where: the density across, or with one density the first dimension of several values."""
+    dims = [dim for dim in SWEPT if dim in comparison["conductivity_mean"].dims]
+    of_models = _model_dims(comparison)
+    several = [dim for dim in dims if dim not in ("density", "method") and comparison.sizes[dim] > 1]
+    across = several[0] if comparison.sizes["density"] == 1 and several else "density"
+    same = [dim for dim in dims if dim not in ("density", across, *of_models)]
+    if across == "density":
+        measure = MEASURES[comparison.attrs["dimension"]]
+        conducting = comparison.attrs["pores_conduct"]
+        label = f"{measure} fraction of the particles [-]" if conducting else DENSITY.format(measure=measure)
+        curves = next((dim for dim in same if dim != "method"), None)
+    else:
+        label = heading_of(across)
+        curves = "method" if "method" in same else next(iter(same), None)
+    return _Axis(across, label, curves, tuple(dim for dim in dims if dim not in ("density", across, curves)))
 
 
 def _panels(comparison: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset]]:
     """A title and a part of the comparison for each panel; no dimension is left but the axis and the curves."""
-    if axis.dim in VARIANTS:
+    if axis.dim != "density":
         comparison = comparison.isel(density=0)
-    dims = [dim for dim in ("contrast", "method") if dim in comparison.dims and dim not in (axis.dim, axis.curves)]
-    if not dims:
-        return [("", comparison)]
-    (dim,) = dims
-    return [(f"{dim} {_word(value)}", comparison.sel({dim: value})) for value in comparison[dim].values]
-
-
-def _word(value: Any) -> str:
-    return value if isinstance(value, str) else f"{value:g}"
+    found = []
+    for values in itertools.product(*(comparison[dim].values for dim in axis.panels)):
+        chosen = dict(zip(axis.panels, values, strict=True))
+        words = (f"method {value}" if dim == "method" else word_of(dim, value) for dim, value in chosen.items())
+        found.append((", ".join(words), comparison.sel(chosen)))
+    return found
 
 
 def _is_wide(values: NDArray[np.float64]) -> bool:
@@ -168,7 +177,7 @@ def _curves(part: xarray.Dataset, axis: _Axis) -> list[tuple[str, xarray.Dataset
     if axis.curves is None:
         return [("simulation", part)]
     values = part[axis.curves].values
-    return [(v if axis.curves == "method" else f"{v:g}°", part.sel({axis.curves: v})) for v in values]
+    return [(word_of(axis.curves, value), part.sel({axis.curves: value})) for value in values]
 
 
 def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
@@ -201,9 +210,9 @@ def _lines(
 ) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]:
     """Name, abscissas and ordinates of every model line."""
     source = lines if axis.dim == "density" else part
-    if "contrast" in source.dims and axis.dim != "contrast":
-        source = source.sel(contrast=part["contrast"].item())
     x, values = source[axis.dim].values, source["model_conductivity"]
+    own = [dim for dim in axis.panels if dim in values.dims]
+    values = values.sel({dim: part[dim].item() for dim in own})
     values = values.isel({dim: 0 for dim in values.dims if dim not in ("model", axis.dim)})  # a formula of the density
     return [(name, x, np.broadcast_to(values.sel({"model": name}).values, x.shape)) for name in _drawn(part)]
 
@@ -253,7 +262,7 @@ def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
         handles.append(Line2D([], [], color=colour, marker=marker, markersize=4.5, linewidth=1.6, label=label))
     if MEAN_FIELD in part["model"].values:
         handles.append(Line2D([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=0.9, label="contact mean field"))
-    title = "contact half-angle" if axis.curves == "contact_angle" else None
+    title = QUANTITIES[axis.curves].long_name if axis.curves is not None and axis.curves in QUANTITIES else None
     columns = min(len(handles), 6)
     figure.legend(
         handles=handles,
@@ -277,8 +286,8 @@ def _notes(comparison: xarray.Dataset) -> str:
     zero = [
         SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
     ]
-    if zero and comparison.attrs["pore_conductivity"] == 0.0:
+    if zero and not comparison.attrs["pores_conduct"]:
         notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
-    if not comparison.attrs["composite"]:
+    if not comparison.attrs["bounds_bind"] or not comparison.attrs["pores_conduct"]:
         notes.append(f"{BOUNDS_NOTE}.")
     return "\n".join(notes)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, style
-from etc_engine.sweep.dataset import SWEPT
+from etc_engine.study.quantities import SWEPT, word_of
 
 if TYPE_CHECKING:
     import xarray
@@ -24,17 +24,9 @@ def cells(values: xarray.DataArray) -> list[tuple[str, xarray.DataArray]]:
     found = []
     for index in itertools.product(*(range(values.sizes[dim]) for dim in dims)):
         picked: dict[Any, int] = dict(zip(dims, index, strict=True))
-        words = [_word(dim, values[dim].values[i]) for dim, i in picked.items()]
+        words = [word_of(dim, values[dim].values[i]) for dim, i in picked.items()]
         found.append((", ".join(words), values.isel(picked)))
     return found
-
-
-def _word(dim: str, value: Any) -> str:
-    if dim == "density":
-        return f"density {value:.4g}"
-    if dim == "contrast":
-        return f"contrast {value:g}"
-    return f"{value:g}°" if dim == "contact_angle" else str(value)
 
 
 def draw_convergence(running: xarray.Dataset) -> Figure:

@@ -3,7 +3,7 @@
 
 const BUSY_SECONDS = 2, IDLE_SECONDS = 4, HIDDEN_SECONDS = 20, QUEUE_TURNS = 2;
 const $ = id => document.getElementById(id);
-let about = null, catalogue = null, view = { poll: null }, token = sessionStorage.getItem("etc-token") || "";
+let about = null, schema = null, catalogue = null, view = { poll: null }, token = sessionStorage.getItem("etc-token") || "";
 let draft = null; // what was typed into the form of a new study, kept while other parts are looked at
 
 function h(tag, attributes = {}, ...children) {
@@ -95,119 +95,31 @@ const stateOf = study => study.cancelling ? "cancelling" : study.state;
 
 // ---- a new study
 
-const FIELDS = [
-  ["Study", [
-    ["name", "Name", "text", "density_angle", ""],
-    ["seed", "Seed", "number", "20261", "the same seed gives the same bits"],
-  ]],
-  ["Packing", [
-    ["packing.method", "Method", "packing", "advancing-front", ""],
-    ["packing.radii", "Radii", "radii", "uniform:0.01:0.02", "a size distribution [m]"],
-    ["packing.box", "Box", "numbers", "1, 1", "edge lengths [m]"],
-    ["packing.periodic", "Periodic axes", "text", "", "such as xy; empty for walls"],
-    ["packing.density", "Density", "numbers", "0.64, 0.70, 0.76", "one or several; empty for the packer's own"],
-    ["packing.count", "Particles", "number", "", "not with advancing-front"],
-  ]],
-  ["Contacts", [
-    ["contacts.rule", "Rule", ["overlap", "bonded", "coordination"], "bonded", ""],
-    ["contacts.contact_angle", "Half-angles", "numbers", "5, 10", "degrees"],
-    ["contacts.bond_gap", "Bond gap", "number", "1e-6", "in mean radii"],
-    ["contacts.coordination", "Mean coordination", "number", "", "neighbours of a particle"],
-  ]],
-  ["Conduction", [
-    ["conduction.engine", "Engine", "engine", "dtem", ""],
-    ["conduction.method", "Method", "method", "chord", ""],
-    ["conduction.conductivity", "Conductivity", "number", "1.0", "of the particles [W/(m K)]"],
-    ["conduction.contact_resistance", "Contact resistance", "number", "0.0", "[m K/W]"],
-    ["composite.matrix_conductivity", "Matrix", "number", "1.0", "its conductivity [W/(m K)]"],
-    ["composite.contrast", "Contrasts", "numbers", "10", "particle over matrix"],
-    ["composite.resolution", "Resolution", "number", "64", "voxels along the shortest edge"],
-    ["composite.nodes", "Nodes", "number", "10000", "particles of the lattice"],
-  ]],
-  ["Statistics", [
-    ["statistics.realizations", "Realizations", "number", "20", "of every density"],
-    ["statistics.confidence", "Confidence", "number", "0.95", ""],
-    ["statistics.relative_ci", "Relative interval", "number", "", "go on until it is this narrow, such as 0.01"],
-    ["statistics.max_realizations", "Most realizations", "number", "", "with a relative interval"],
-  ]],
-  ["Models to compare with", [
-    ["models.names", "Names", "words", "hashin_shtrikman_upper, effective_medium, contact_mean_field", "see Models"],
-    ["models.pore_conductivity", "Pore conductivity", "number", "0.0", "[W/(m K)]"],
-  ]],
-];
-// Which fields have a meaning with the chosen engine and rule; the others are neither shown nor sent.
-function meant(path, values) {
-  const engine = values["conduction.engine"], rule = values["contacts.rule"], composite = about.composite_engines.includes(engine);
-  if (path.startsWith("composite."))
-    return composite && path !== (engine === "lattice" ? "composite.resolution" : "composite.nodes");
-  if (composite && (path.startsWith("contacts.") || path === "conduction.contact_resistance" || path === "conduction.conductivity"
-    || path === "models.pore_conductivity")) return false;
-  if (path === "contacts.coordination") return rule === "coordination";
-  return rule !== "overlap" || !["contacts.contact_angle", "contacts.bond_gap"].includes(path);
-}
+const allFields = () => draft.tables.flatMap(([, fields]) => fields);
 
-const number = word => word.trim() !== "" && Number.isFinite(Number(word)) ? Number(word) : word.trim();
-function valueOf(kind, word) {
-  if (kind === "number") return number(word);
-  if (kind === "numbers") return word.split(",").map(number);
-  if (kind === "words") return word.split(",").map(item => item.trim()).filter(Boolean);
-  return word.trim();
-}
-
-function optionsOf(kind) {
-  if (Array.isArray(kind)) return kind;
-  if (kind === "packing") return about.packing_methods;
-  if (kind === "engine") return Object.keys(about.conduction_methods);
-  if (kind === "method") return about.conduction_methods[draft.values["conduction.engine"]] || [];
-  return null;
-}
-
-function fieldOf([path, label, kind, , hint]) {
-  const id = `field-${path}`, value = draft.values[path], options = optionsOf(kind);
-  const common = { id, name: path, "data-kind": Array.isArray(kind) ? "text" : kind, "aria-describedby": `${id}-hint ${id}-error`,
-    autocomplete: "off", spellcheck: "false" };
-  const control = options
-    ? h("select", common, options.map(option => h("option", { value: option, selected: option === value }, option)))
-    : h("input", { ...common, value, list: kind === "radii" ? "radii-words" : null, inputmode: kind === "number" ? "decimal" : null });
-  return h("div", { class: "field", "data-field": path }, h("label", { for: id }, label), control,
-    h("p", { class: "hint", id: `${id}-hint` }, hint), h("p", { class: "error", id: `${id}-error` }));
-}
-
-function studyOf(values) {
-  const study = { schema: 1 };
-  for (const [, fields] of FIELDS) for (const [path, , kind] of fields) {
-    const word = values[path], [table, key] = path.split(".");
-    if (word.trim() === "" || !meant(path, values)) continue;
-    const value = valueOf(kind, word);
-    if (key) (study[table] = study[table] || {})[key] = value; else study[table] = value;
-  }
-  return study;
-}
-
-function tomlOf(study) {
-  const word = value => typeof value === "string" ? JSON.stringify(value)
-    : Array.isArray(value) ? `[${value.map(word).join(", ")}]` : String(value);
-  const lines = [], tables = [];
-  for (const [key, value] of Object.entries(study)) {
-    if (typeof value === "object" && !Array.isArray(value))
-      tables.push("", `[${key}]`, ...Object.entries(value).map(([name, item]) => `${name} = ${word(item)}`));
-    else lines.push(`${key} = ${word(value)}`);
-  }
-  return [...lines, ...tables, ""].join("\n");
+function fieldOf(field) {
+  const id = `field-${field.place}`, value = draft.values[field.place], words = wordsOf(field, draft.values);
+  const common = { id, name: field.place, "aria-describedby": `${id}-hint ${id}-error`, autocomplete: "off", spellcheck: "false" };
+  const control = words && !field.list
+    ? h("select", common, (field.required || field.start !== null ? words : ["", ...words]).map(word =>
+      h("option", { value: word, selected: word === value }, word)))
+    : h("input", { ...common, value, list: words ? `${id}-words` : null, inputmode: field.numbers && !field.list ? "decimal" : null });
+  return h("div", { class: "field", "data-field": field.place }, h("label", { for: id }, field.title), control,
+    words && field.list ? h("datalist", { id: `${id}-words` }, words.map(word => h("option", { value: word }))) : null,
+    h("p", { class: "hint", id: `${id}-hint` }, field.hint), h("p", { class: "error", id: `${id}-error` }));
 }
 
 function newStudy() {
   if (!draft) {
-    const values = {};
-    for (const [, fields] of FIELDS) for (const [path, , , value] of fields) values[path] = value;
-    draft = { mode: "form", values, text: "" };
+    const tables = tablesOf(schema);
+    draft = { mode: "form", tables, values: startOf(schema, tables), text: "" };
   }
   const body = h("form", { novalidate: true });
   const size = h("p", { class: "size faint", id: "size", "aria-live": "polite" });
   const general = h("p", { class: "error", id: "study-error", role: "alert" });
   const tab = (mode, label) => h("button", { type: "button", role: "tab", id: `tab-${mode}`, "aria-selected": draft.mode === mode ? "true" : "false",
-    onclick: () => { if (mode === "text" && draft.mode === "form") draft.text = tomlOf(studyOf(draft.values)); draft.mode = mode; newStudy(); } }, label);
-  const read = () => draft.mode === "text" ? [draft.text, "application/toml"] : [JSON.stringify(studyOf(draft.values)), "application/json"];
+    onclick: () => { if (mode === "text" && draft.mode === "form") draft.text = tomlOf(studyOf(schema, draft.tables, draft.values)); draft.mode = mode; newStudy(); } }, label);
+  const read = () => draft.mode === "text" ? [draft.text, "application/toml"] : [JSON.stringify(studyOf(schema, draft.tables, draft.values)), "application/json"];
   let timer = null, asked = 0;
 
   function tell(error) {
@@ -241,13 +153,17 @@ function newStudy() {
   function changed() { clearTimeout(timer); timer = setTimeout(check, 350); }
 
   if (draft.mode === "form") {
-    body.append(...FIELDS.map(([title, fields]) => h("fieldset", {}, h("legend", {}, title), h("div", { class: "fields" }, fields.map(fieldOf)))),
-      h("datalist", { id: "radii-words" }, about.size_distributions.map(word => h("option", { value: word }))));
-    const hide = () => { for (const field of body.querySelectorAll(".field")) field.hidden = !meant(field.dataset.field, draft.values);
-      for (const set of body.querySelectorAll("fieldset")) set.hidden = !set.querySelector(".field:not([hidden])"); };
+    body.append(...draft.tables.map(([title, fields]) => h("fieldset", {}, h("legend", {}, title), h("div", { class: "fields" }, fields.map(fieldOf)))));
+    const hide = () => {
+      for (const field of body.querySelectorAll(".field"))
+        field.hidden = !meant(allFields().find(one => one.place === field.dataset.field), draft.values, allFields());
+      for (const set of body.querySelectorAll("fieldset")) set.hidden = !set.querySelector(".field:not([hidden])");
+    };
     body.addEventListener("input", event => {
       draft.values[event.target.name] = event.target.value;
-      if (event.target.name === "conduction.engine") { draft.values["conduction.method"] = about.conduction_methods[event.target.value][0]; newStudy(); }
+      const follow = allFields().filter(field => field.words && !Array.isArray(field.words) && event.target.name in field.words);
+      for (const field of follow) draft.values[field.place] = "";
+      if (follow.length) newStudy();
       hide();
       changed();
     });
@@ -395,27 +311,25 @@ function solve() {
   const form = h("form", { novalidate: true }, h("fieldset", {}, h("legend", {}, "Particles"), h("div", { class: "fields" },
     field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS dump"),
     input("box", "1,1", "edge lengths, for CSV; a dump brings its own", "Box"), input("periodic", "", "such as xy, for CSV", "Periodic axes"),
-    field("method", "Method", h("select", { id: "method", name: "method" }, [...about.conduction_methods.dtem, "pipe"].map(m => h("option", {}, m))), ""),
-    field("pipe_resistance", "Pipe resistance", h("select", { id: "pipe_resistance", name: "pipe_resistance" },
-      about.conduction_methods.pipe.map(m => h("option", {}, m))), "with the method pipe"),
+    field("engine", "Engine", h("select", { id: "engine", name: "engine" }, Object.keys(about.engines).map(word => h("option", {}, word))), ""),
+    field("method", "Method", h("select", { id: "method", name: "method" }), ""),
     input("contact_angle", "", "degrees; empty: overlaps", "Contact half-angle"), input("conductivity", "", "of the particles [W/(m K)]", "Conductivity"))),
     h("div", { class: "buttons" }, button));
-  const pipe = form.querySelector("#pipe_resistance").closest(".field"), hide = () => { pipe.hidden = form.elements.method.value !== "pipe"; };
-  form.addEventListener("change", hide);
-  hide();
+  const fill = () => form.elements.method.replaceChildren(...about.engines[form.elements.engine.value].map(word => h("option", {}, word)));
+  form.elements.engine.addEventListener("change", fill);
+  fill();
   form.addEventListener("submit", async event => {
     event.preventDefault();
     const file = $("file").files[0];
     if (!file) { answer.replaceChildren(h("p", { class: "error" }, "Choose a file first.")); return; }
     const query = new URLSearchParams();
-    const names = ["box", "periodic", "method", "contact_angle", "conductivity", ...form.elements.method.value === "pipe" ? ["pipe_resistance"] : []];
-    for (const name of names) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
+    for (const name of ["box", "periodic", "engine", "method", "contact_angle", "conductivity"]) if (form.elements[name].value.trim()) query.set(name, form.elements[name].value.trim());
     button.disabled = true;
     answer.replaceChildren(h("p", { class: "faint" }, "Solving …"));
     try {
       const found = await post(`/api/solve?${query}`, file, "application/octet-stream");
       const shown = [["conductivity [W/(m K)]", found.conductivity.toPrecision(8)], ["particles", found.particles], ["contacts", found.contacts],
-        ["wall contacts", found.wall_contacts], ["percolates", found.percolates ? "yes" : "no"], ["method", found.method], ["seconds", found.seconds.toFixed(2)]];
+        ["wall contacts", found.wall_contacts], ["percolates", found.percolates ? "yes" : "no"], ["engine and method", `${found.engine}, ${found.method}`], ["seconds", found.seconds.toFixed(2)]];
       if (found.conductivity_tensor) shown.splice(1, 0, ["tensor", found.conductivity_tensor.map(row => row.map(k => k.toPrecision(6)).join(" ")).join("; ")]);
       answer.replaceChildren(facts(shown.map(([key, value]) => [key, String(value)])), ...found.warnings.map(text => h("p", { class: "error" }, text)));
     } catch (error) { answer.replaceChildren(h("p", { class: "error", role: "alert" }, error.message)); }
@@ -493,7 +407,7 @@ async function tick() {
 }
 
 async function start() {
-  try { about = await get("/api/service"); }
+  try { [about, schema] = await Promise.all([get("/api/service"), get("/api/schema")]); }
   catch (error) { if (error.status !== 401) alarm(error.message); return; }
   $("about").textContent = `${about.ranks} rank${about.ranks > 1 ? "s" : ""} a study, ${about.launcher}`;
   await route();

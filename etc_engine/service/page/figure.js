@@ -66,13 +66,7 @@ function mark(shape, x, y, colour) {
   return draw("path", { d, ...common });
 }
 
-function seriesName(series) {
-  const words = [];
-  if (series.contact_angle !== null) words.push(`contact half-angle ${series.contact_angle}°`);
-  if (series.contrast !== null) words.push(`contrast ${series.contrast}`);
-  if (series.method !== null) words.push(series.method);
-  return words.join(", ") || "simulation";
-}
+const seriesName = series => series.name || "simulation";
 
 // Runs of neighbouring points for which all the given values are there.
 function runs(density, ...lists) {

@@ -1,0 +1,251 @@
+"""The physical values of a study file that may be a list: one row each, and a row is all that a new one takes.
+
+A list becomes a dimension of the result, named as its row, in the order of the rows. Work is shared: what does not
+change the packing uses one packing, what does not change the contacts uses one contact network.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import AfterValidator, Field, Tag, create_model
+
+from etc_engine.study.schema import (
+    AS_LIST,
+    AS_NUMBER,
+    NOT_NEGATIVE,
+    POSITIVE,
+    WRITTEN,
+    NotNegative,
+    Positive,
+    StudyTable,
+    without_repeats,
+)
+
+Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
+Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+T = TypeVar("T", bound="QuantityTable")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A physical value of a study file.
+
+    Parameters
+    ----------
+    place : str
+        Table and key, such as ``contacts.contact_angle``.
+    units : str
+        Of the dimension, in the spelling of CF.
+    long_name, comment : str
+        Of the dimension.
+    changes : str
+        What has to be made again for another value: the packing, the contacts, or the medium alone.
+    check : type
+        What a value has to be, for pydantic; ``allowed`` says it in words.
+    name : str
+        Of the dimension, if it is not the key.
+    default : float, optional
+        None where the study need not give a value.
+    si : float
+        Factor from the unit of the study file to that of the engine.
+    """
+
+    place: str
+    units: str
+    long_name: str
+    changes: Literal["packing", "contacts", "medium"]
+    check: Any
+    allowed: str
+    name: str = ""
+    default: float | None = None
+    comment: str = ""
+    si: float = 1.0
+
+    @property
+    def table(self) -> str:
+        """The table that holds the key."""
+        return self.place.rpartition(".")[0]
+
+    @property
+    def key(self) -> str:
+        """The key in its table."""
+        return self.place.rpartition(".")[2]
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of the dimension in the result."""
+        found = {"long_name": self.long_name, "units": self.units, "comment": self.comment}
+        return {key: value for key, value in found.items() if value}
+
+    def field(self) -> tuple[Any, Any]:
+        """Annotation and default of the key, for pydantic: a value, or a list of different ones, put in order."""
+        check: Any = self.check
+        several: Any = Annotated[tuple[check, ...], AfterValidator(_ascending), Field(min_length=1)]
+        one_or_several: Any = Annotated[Annotated[check, Tag(AS_NUMBER)] | Annotated[several, Tag(AS_LIST)], WRITTEN]
+        units = "" if self.units == "1" else f" [{self.units}]"
+        described = f"{self.allowed}{units}, or a list of different ones"
+        required = self.default is None and self.table.count(".") > 0  # a table in a table says all of it
+        return (
+            one_or_several if required else one_or_several | None,
+            Field(... if required else self.default, description=described, title=self.long_name),
+        )
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple(sorted(without_repeats(values)))
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    row.name or row.key: row
+    for row in (
+        Quantity("packing.density", "1", "density", "packing", Positive, POSITIVE),
+        Quantity(
+            "contacts.contact_angle",
+            "degree",
+            "contact half-angle",
+            "contacts",
+            Angle,
+            "a half-angle between 0 and 90 degrees, both excluded",
+            comment="half of the angle that the contact subtends at the centre of a particle; not a wetting angle",
+            si=float(np.pi / 180.0),
+        ),
+        Quantity(
+            "contacts.bond_gap",
+            "1",
+            "largest bonded gap over the mean radius of the pair",
+            "contacts",
+            NotNegative,
+            NOT_NEGATIVE,
+            default=1e-6,
+        ),
+        Quantity("contacts.coordination", "1", "mean coordination number", "contacts", Positive, POSITIVE),
+        Quantity(
+            "contacts.contact_resistance",
+            "K W-1",
+            "thermal resistance of a contact",
+            "contacts",
+            NotNegative,
+            NOT_NEGATIVE,
+            default=0.0,
+            comment="of disks per unit thickness, m K W-1",
+        ),
+        Quantity(
+            "particles.conductivity",
+            "W m-1 K-1",
+            "conductivity of the particles",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="particle_conductivity",
+            default=1.0,
+        ),
+        Quantity(
+            "particles.mixture.conductivity",
+            "W m-1 K-1",
+            "conductivity of the second material of the particles",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="mixture_conductivity",
+        ),
+        Quantity(
+            "particles.mixture.fraction",
+            "1",
+            "number fraction of the particles of the second material",
+            "medium",
+            Share,
+            "a number from 0 to 1",
+            name="mixture_fraction",
+        ),
+        Quantity(
+            "pores.conductivity",
+            "W m-1 K-1",
+            "conductivity of what fills the pores",
+            "medium",
+            NotNegative,
+            NOT_NEGATIVE,
+            name="pore_conductivity",
+            default=0.0,
+        ),
+    )
+}
+"""The rows by the names of their dimensions, in the order of the dimensions of a result."""
+
+SWEPT = (*QUANTITIES, "method")
+"""The dimensions of the cells of a sweep, in order; `density` is always there, another where the study has a list."""
+
+
+class QuantityTable(StudyTable):
+    """A table to which `with_quantities` adds its rows."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """The value of a key that a row adds."""
+
+
+def with_quantities(table: str) -> Callable[[type[T]], type[T]]:
+    """Add the rows of a table to the class that reads it.
+
+    Examples
+    --------
+    >>> @with_quantities("pores")
+    ... class Pores(QuantityTable):
+    ...     pass
+    >>> Pores.model_validate({"conductivity": [0.04, 0.02]}).model_dump()
+    {'conductivity': (0.02, 0.04)}
+    """
+
+    def extended(cls: type[T]) -> type[T]:
+        fields: dict[str, Any] = {row.key: row.field() for row in QUANTITIES.values() if row.table == table}
+        return create_model(cls.__name__, __base__=cls, __module__=cls.__module__, __doc__=cls.__doc__, **fields)
+
+    return extended
+
+
+def value_of(study: StudyTable, row: Quantity) -> float | tuple[float, ...] | None:
+    """What a study says of a quantity: a value, several, or None where it says nothing."""
+    found: Any = study
+    for key in row.place.split("."):
+        found = getattr(found, key, None)
+    given: float | tuple[float, ...] | None = found
+    return given
+
+
+def word_of(name: str, value: Any) -> str:
+    """A value of a dimension in words, for titles and legends.
+
+    Examples
+    --------
+    >>> word_of("contact_angle", 2.5), word_of("pore_conductivity", 0.04), word_of("method", "chord")
+    ('2.5°', 'pore conductivity 0.04', 'chord')
+    """
+    if name not in QUANTITIES:
+        return str(value)
+    if QUANTITIES[name].units == "degree":
+        return f"{value:.4g}°"
+    return f"{name.replace('_', ' ')} {value:.4g}"
+
+
+def heading_of(name: str) -> str:
+    """The heading of a column or an axis that holds a dimension.
+
+    Examples
+    --------
+    >>> heading_of("contact_angle"), heading_of("particle_conductivity"), heading_of("density")
+    ('contact half-angle [degree]', 'conductivity of the particles [W/(m K)]', 'density')
+    """
+    row = QUANTITIES.get(name)
+    if row is None:
+        return name
+    if row.units == "1":
+        return row.long_name
+    return f"{row.long_name} [{READABLE.get(row.units, row.units)}]"
+
+
+READABLE = {"W m-1 K-1": "W/(m K)", "K W-1": "K/W"}
+"""Units as they are written for readers."""
