@@ -318,6 +318,8 @@ ENGINES: Mapping[str, Engine] = {
             {
                 "chord": Method("resistance of a contact chord", (2, 3), transient=True),
                 "uniform": Method("resistance under uniform flux (Feng et al. 2009)", (2, 3), transient=True),
+                "holm": Method("2 kappa c, for small contacts of radius c", (3,), transient=True),
+                "root-area": Method("2 kappa sqrt(A), as in some DEM codes: 1.77 times too much", (3,), transient=True),
             },
             lambda media, conduction, _: pipe.solve_series(media, conduction),
             system=pipe_system,

@@ -27,6 +27,10 @@ from etc_engine.study.schema import (
 
 Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+SHARE = "a number from 0 to 1"
+Accommodation = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
+Poisson = Annotated[float, Field(strict=True, gt=-1.0, le=0.5)]
+POISSON = "a number above -1, up to 0.5"
 T = TypeVar("T", bound="QuantityTable")
 
 
@@ -134,6 +138,53 @@ QUANTITIES: Mapping[str, Quantity] = {
             comment="of disks per unit thickness, m K W-1",
         ),
         Quantity(
+            "contacts.youngs_modulus",
+            "Pa",
+            "Young's modulus of the particles",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.poisson_ratio", "1", "Poisson's ratio of the particles", "contacts", Poisson, POISSON),
+        Quantity("contacts.wall_youngs_modulus", "Pa", "Young's modulus of the walls", "contacts", Positive, POSITIVE),
+        Quantity("contacts.wall_poisson_ratio", "1", "Poisson's ratio of the walls", "contacts", Poisson, POISSON),
+        Quantity(
+            "contacts.simulated_modulus",
+            "Pa",
+            "Young's modulus of the run that made the overlaps",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.load", "Pa", "mean stress that the contacts carry", "contacts", Positive, POSITIVE),
+        Quantity(
+            "contacts.roughness.height",
+            "m",
+            "rms roughness height, of both surfaces together",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_height",
+        ),
+        Quantity(
+            "contacts.roughness.slope",
+            "1",
+            "rms roughness slope, of both surfaces together",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_slope",
+        ),
+        Quantity(
+            "contacts.roughness.hardness",
+            "Pa",
+            "micro-hardness of the softer surface",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_hardness",
+        ),
+        Quantity(
             "particles.conductivity",
             "W m-1 K-1",
             "conductivity of the particles",
@@ -158,7 +209,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             "number fraction of the particles of the second material",
             "medium",
             Share,
-            "a number from 0 to 1",
+            SHARE,
             name="mixture_fraction",
         ),
         Quantity(
@@ -171,6 +222,17 @@ QUANTITIES: Mapping[str, Quantity] = {
             name="pore_conductivity",
             default=0.0,
         ),
+        Quantity("pores.pressure", "Pa", "pressure of the gas", "medium", NotNegative, NOT_NEGATIVE),
+        Quantity(
+            "pores.accommodation",
+            "1",
+            "thermal accommodation coefficient of the surfaces",
+            "medium",
+            Accommodation,
+            "a number above 0, up to 1",
+        ),
+        Quantity("radiation.emissivity", "1", "emissivity of the particles", "medium", Share, SHARE),
+        Quantity("conduction.temperature", "K", "temperature", "medium", Positive, POSITIVE),
     )
 }
 """The rows by the names of their dimensions, in the order of the dimensions of a result."""
