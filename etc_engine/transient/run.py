@@ -15,8 +15,8 @@ from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
-from etc_engine.medium.transient import ParticleSystem
-from etc_engine.medium.walls import value_at
+from etc_engine.medium.transient import HeatSource, ParticleSystem
+from etc_engine.medium.walls import knots_of, value_at
 from etc_engine.packing import ParticlePacking, pack
 from etc_engine.particle_files.dumps import read_trajectory
 from etc_engine.particle_files.formats import format_to_read, read_particles
@@ -272,7 +272,7 @@ def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
     return contact_network(packing, study.contacts.rule, study.contacts.values())
 
 
-def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.float64]]:
+def _source(study: NetworkStudy, count: int) -> HeatSource:
     """Heat set free in each particle at a time; sources on one particle add up."""
     parts = []
     for k, source in enumerate(study.source):
@@ -284,7 +284,7 @@ def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.flo
     def heat(t: float) -> NDArray[np.float64]:
         return sum((share * value_at(value, t) for share, value in parts), np.zeros(count))
 
-    return heat
+    return HeatSource(heat, tuple(sorted({knot for _, value in parts for knot in knots_of(value)})))
 
 
 def _digest(study: NetworkStudy, course: _Course) -> str:
