@@ -101,7 +101,8 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
     }
     for name, values in study.quantities.items():
         several = name in study.axes
-        found[name] = (name if several else (), np.array(values if several else values[0]), QUANTITIES[name].attributes)
+        attributes = QUANTITIES[name].attributes(study.box.dimension)
+        found[name] = (name if several else (), np.array(values if several else values[0]), attributes)
     return found
 
 
