@@ -19,6 +19,7 @@ from etc_engine.cli.particle_options import (
     warn_of_excess,
     warn_of_sample,
 )
+from etc_engine.cli.physics_options import PhysicsWords, physics_options
 
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
@@ -53,6 +54,7 @@ BOND_GAP = 1e-6
     show_default=True,
     help="Conductivity of what fills the pores [W/(m K)].",
 )
+@physics_options
 @click.option(
     "--contact-resistance",
     type=float,
@@ -125,6 +127,7 @@ class _Asked:
     conductivity: float | None
     pore_conductivity: float
     contact_resistance: float
+    physics: PhysicsWords
 
     def refuse_old_words(self) -> None:
         """Refuse spellings of earlier versions, and options that mean nothing together."""
@@ -133,8 +136,10 @@ class _Asked:
         if self.method == "pipe" or self.pipe_resistance is not None:
             found = "--method pipe" if self.method == "pipe" else f"--pipe-resistance {self.pipe_resistance}"
             raise InputError(f"{found} is now --engine pipe --method {self.pipe_resistance or 'chord'}")
-        if self.contact_angle is None and self.bond_gap != BOND_GAP:
+        if self.contact_angle is None and self.bond_gap != BOND_GAP and self.physics.contact_rule != "load":
             raise InputError("--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap")
+        if self.contact_resistance > 0.0 and self.physics.roughness is not None:
+            raise InputError("--contact-resistance and --roughness both resist at contacts: leave one of them out")
 
     def medium(self, table: ParticleTable, particles: Path) -> Medium:
         """The particles of a file with contacts and materials."""
@@ -143,19 +148,22 @@ class _Asked:
         import numpy as np
 
         from etc_engine.errors import InputError
-        from etc_engine.medium.medium import Medium, Pores
-        from etc_engine.medium.rules import bonded_contacts, overlap_contacts
+        from etc_engine.medium.medium import Medium
 
+        if self.conductivity is not None and self.physics.material is not None:
+            raise InputError("--material and --conductivity both say what the particles are: leave one of them out")
         if self.conductivity is not None and table.conductivity is not None:
             raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
-        given = 1.0 if self.conductivity is None else self.conductivity
-        if self.contact_angle is None:
-            network = overlap_contacts(table.packing)
-        else:
-            network = bonded_contacts(table.packing, radians(self.contact_angle), self.bond_gap)
-        network = network.with_resistance(self.contact_resistance)
+        solid = self.physics.solid() if self.conductivity is None else self.conductivity
+        given = 1.0 if solid is None else solid
         kappa = np.asarray(given if table.conductivity is None else table.conductivity)
-        return Medium(table.packing, kappa, network, Pores(self.pore_conductivity))
+        half_angle = None if self.contact_angle is None else radians(self.contact_angle)
+        network = self.physics.network(table.packing, half_angle, self.bond_gap)
+        pores = self.physics.pores(table.packing, self.pore_conductivity)
+        if self.contact_resistance > 0.0 or self.physics.roughness is None:
+            network = network.with_resistance(self.contact_resistance)
+        network = self.physics.roughened(network, kappa, pores)
+        return Medium(table.packing, kappa, network, pores)
 
     def solve(self, medium: Medium, engine: Engine, method: str, axes: tuple[int, ...]) -> EffectiveConductivity[Any]:
         """The conductivity along the axes."""
@@ -284,6 +292,8 @@ def _record(
         "particles": medium.packing.count,
         "density": medium.packing.density,
         "pore_conductivity": medium.pores.conductivity,
+        "contact_rule": network.rule,
+        **asked.physics.record,
         "contacts": int(np.count_nonzero(network.angles[:, 0])),
         "links": network.count,
         "wall_contacts": len(network.walls_of(axis)),

@@ -1,13 +1,14 @@
 """The cell element of spheres: parts against quadrature and series, the whole against lattice sums and invariants."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.cell_3d.cells import CellMaterials, Frame, build_cells
+from etc_engine.engines.dtem.cell_3d.cells import Frame
 from etc_engine.engines.dtem.cell_3d.face_mesh import (
     boundary_nodes,
     fan_triangles,
@@ -19,11 +20,12 @@ from etc_engine.engines.dtem.cell_3d.face_mesh import (
 from etc_engine.engines.dtem.cell_3d.plan import Fineness
 from etc_engine.engines.dtem.cell_3d.shell import radial_moments, shell_matrices
 from etc_engine.engines.dtem.cell_3d.sphere_energy import green_function, green_matrix, green_table, sandwich
-from etc_engine.engines.dtem.cell_3d.system import solve_cells
-from etc_engine.engines.dtem.cell_3d.topology import cell_topology
+from etc_engine.engines.dtem.cell_3d.steady import solve_sphere_cells, sphere_cell_conductivity, sphere_cells
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.sphere import resistance_matrices
-from etc_engine.structure.laguerre_polygons import laguerre_polygons
+from etc_engine.medium.facets import facet_links
+from etc_engine.medium.rules import overlap_contacts
+from etc_engine.packing.particles import ParticlePacking
 
 PLACES = {
     "simple_cubic": [[0, 0, 0]],
@@ -45,42 +47,44 @@ def lattice(name, gap):
 
 
 def cells(centers, radii, box, solid, fluid=1.0, frame=DEFAULT, fineness=COARSE, contact=None, resistance=0.0):
-    topology = cell_topology(laguerre_polygons(centers, radii, box), len(radii))
-    polygons = topology.polygons
-    materials = CellMaterials(
-        np.broadcast_to(np.asarray(solid, dtype=float), radii.shape).copy(),
-        fluid,
-        np.zeros(polygons.count) if contact is None else contact(polygons, centers, radii, box),
-        np.full(polygons.count, resistance),
-    )
-    return build_cells(topology, (centers, radii), box, materials, frame, fineness)
+    packing = ParticlePacking(centers, radii, box)
+    links = facet_links(overlap_contacts(packing))
+    if contact is None:
+        links = replace(links, contacts=np.zeros_like(links.contacts))
+    else:
+        sizes = np.concatenate(
+            (
+                contact(links.pairs[:, 0], links.pairs[:, 1], links.branches, packing),
+                contact(links.wall_particles, -1 - links.walls, None, packing),
+            )
+        )
+        links = replace(links, contacts=sizes, bonds=np.full(sizes.size, resistance))
+    return sphere_cells(links, solid, fluid, frame=frame, fineness=fineness)
 
 
-def overlap(polygons, centers, radii, box):
+def overlap(i, j, branches, packing):
     """Radii of the circles in which spheres cut each other and walls cut spheres, 0 where they do not."""
-    i, j = polygons.cells.T
-    wall, lengths = j < 0, np.array(box.lengths)
-    k = np.where(wall, i, j)
-    distance = np.linalg.norm(centers[k] - centers[i] + polygons.shifts * lengths, axis=1)
-    height = (distance**2 + radii[i] ** 2 - radii[k] ** 2) / np.where(wall, 1.0, 2.0 * distance)
-    axis, end = np.where(wall, -1 - j, 0) // 2, (-1 - j) % 2
-    height[wall] = np.abs(end * lengths[axis] - centers[i, axis])[wall]
+    radii = packing.radii
+    if branches is None:
+        axis, end = (-1 - j) // 2, (-1 - j) % 2
+        height = np.abs(end * np.array(packing.box.lengths)[axis] - packing.centers[i, axis])
+    else:
+        distance = np.linalg.norm(branches, axis=1)
+        height = (distance**2 + radii[i] ** 2 - radii[j] ** 2) / (2.0 * distance)
     return np.sqrt(np.maximum(radii[i] ** 2 - height**2, 0.0)) * (height < radii[i] * (1.0 - 1e-9))
 
 
 def touching(radius):
     """Contacts of one radius where spheres of radius 1 touch."""
 
-    def contact(polygons, centers, radii, box):
-        i, j = polygons.cells.T
-        distance = np.linalg.norm(centers[j] - centers[i] + polygons.shifts * np.array(box.lengths), axis=1)
-        return np.where(distance < 2.0 + 1e-6, radius, 0.0)
+    def contact(i, j, branches, packing):
+        return np.zeros(0) if branches is None else np.where(np.linalg.norm(branches, axis=1) < 2.0 + 1e-6, radius, 0.0)
 
     return contact
 
 
-def conductivity(centers, radii, box, solid, **options):
-    return solve_cells(cells(centers, radii, box, solid, **options), box, tolerance=1e-10).conductivity
+def conductivity(*arguments, axes=None, **options):
+    return sphere_cell_conductivity(cells(*arguments, **options), axes=axes).tensor
 
 
 def dense(system, cell):
@@ -233,7 +237,7 @@ def test_energy_of_a_ball(degree, exact):
 
 @pytest.mark.parametrize("frame", [Frame(1, 1), Frame(3, 1), Frame(3, 3)])
 def test_cell_matrices_conduct_nothing_without_differences(frame):
-    system = cells(*few_spheres(), Box((1.0, 1.0, 1.0), (True,) * 3), 30.0, frame=frame)
+    system = cells(*few_spheres(), Box((1.0, 1.0, 1.0), (True,) * 3), 30.0, frame=frame).system
     for cell in range(4):
         matrix = dense(system, cell)
         own = system.unknowns[system.starts[cell] : system.starts[cell + 1]]
@@ -278,6 +282,25 @@ def test_walls_mirror():
     both = conductivity(twice, np.tile(radii, 2), Box((2.0, 1.0, 1.0), (True,) * 3), 40.0)
     np.testing.assert_allclose(np.diag(k), np.diag(both), rtol=2e-5)
     assert np.isnan(k[0, 1])
+
+
+def test_heat_and_temperatures_between_walls():
+    """Heat flows balance (checked on the way), and spheres lie between the walls in their order along the axis."""
+    centers, radii = few_spheres()
+    model = cells(centers, radii, Box((1.0, 1.0, 1.0)), 40.0)
+    solution = solve_sphere_cells(model, (2,))
+    heat_in, heat_out = solution.wall_heat()
+    assert heat_in == pytest.approx(heat_out, rel=1e-6)
+    assert heat_in == pytest.approx(solution.energies[0, 0], rel=1e-6)
+    temperatures = solution.sphere_temperatures[:, 0]
+    assert ((temperatures > 0.0) & (temperatures < 1.0)).all()
+    assert (np.argsort(-temperatures) == np.argsort(centers[:, 2])).all()
+
+
+def test_spheres_of_the_fluid_have_the_linear_field():
+    centers, radii = few_spheres()
+    solution = solve_sphere_cells(cells(centers, radii, Box((1.0, 1.0, 1.0)), 1.0), (0,))
+    np.testing.assert_allclose(solution.sphere_temperatures[:, 0], 1.0 - centers[:, 0], atol=2e-3)
 
 
 def test_scaling_permutation_and_rotation():
@@ -340,10 +363,8 @@ def test_contacts_in_near_vacuum(case):
 def test_random_spheres_between_walls_in_near_vacuum():
     """Polydisperse, cut by each other and by the walls, against finite elements (error .03 %)."""
     (case,) = [c for c in CASES if c["kind"] == "vacuum_random_walls" and c["case"] == 2]
-    system = cells(
-        np.array(case["centres"]), np.array(case["radii"]), Box((1.0,) * 3), 1.0, fluid=1e-8, contact=overlap
-    )
-    k = solve_cells(system, Box((1.0,) * 3), (2,)).conductivity
+    arguments = np.array(case["centres"]), np.array(case["radii"]), Box((1.0,) * 3), 1.0
+    k = conductivity(*arguments, fluid=1e-8, contact=overlap, axes=(2,))
     assert k[2, 2] == pytest.approx(case["value"], rel=1e-3)
     assert np.isnan(k[0, 0])
 

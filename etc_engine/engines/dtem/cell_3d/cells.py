@@ -85,6 +85,8 @@ class CellSystem:
         Field of unit gradient in each direction that is zero at the cell's centre.
     blocks : ndarray, shape (size + 1,)
         Where the unknowns of each vertex, edge and facet start; ``blocks[vertices]`` is the first edge.
+    means : ndarray, shape (u,)
+        Mean temperature of each sphere, over the cell's unknowns.
     rim_nodes : ndarray, shape (n,)
         Nodes on each sphere.
     """
@@ -96,6 +98,7 @@ class CellSystem:
     unknowns: Integers
     arms: Floats
     blocks: Integers
+    means: Floats
     rim_nodes: Integers
 
     @property
@@ -181,20 +184,30 @@ def build_cells(
         (on_edges, on_faces, powers),
     )
     tables = (radial_moments(fineness.radial_degree), rule, green_table())
-    matrices, unknowns, nodes = [], [], np.zeros(len(radii), dtype=np.int64)
+    matrices, unknowns, means, nodes = [], [], [], np.zeros(len(radii), dtype=np.int64)
     for cell in range(len(radii)):
         media = (radii[cell], materials.spheres[cell], materials.fluid, resistances[cell])
-        matrix, inside, directions = cell_energy(cell, *arguments, media, tables)
+        matrix, inside, weights, nodes[cell] = cell_energy(cell, *arguments, media, tables)
         own = _unknowns(cell, topology, blocks)
-        left = eliminate(matrix, inside, definite=not len(resistances[cell]))
+        left, mean = eliminate(matrix, inside, weights, definite=not len(resistances[cell]))
         matrices.append(left[np.tril_indices(len(left))])
         unknowns.append(own)
-        nodes[cell] = len(directions)
+        means.append(mean)
     starts = np.concatenate(([0], np.cumsum([len(own) for own in unknowns]))).astype(np.int64)
     arms = np.zeros((int(starts[-1]), 3))
     corner = np.arange(len(topology.vertices)) - np.repeat(topology.vertex_starts[:-1], np.diff(topology.vertex_starts))
     arms[corner + np.repeat(starts[:-1], np.diff(topology.vertex_starts))] = plan.arms
-    return CellSystem(topology, plan, np.concatenate(matrices), starts, np.concatenate(unknowns), arms, blocks, nodes)
+    return CellSystem(
+        topology,
+        plan,
+        np.concatenate(matrices),
+        starts,
+        np.concatenate(unknowns),
+        arms,
+        blocks,
+        np.concatenate(means),
+        nodes,
+    )
 
 
 def _contact_matrices(topology: CellTopology, plan: CellPlan, radii: Floats, materials: CellMaterials) -> list[Floats]:

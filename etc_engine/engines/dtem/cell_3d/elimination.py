@@ -160,7 +160,9 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
     add_sphere(
         matrix, (first_rim, first_flow), sphere * radius, (ball, directions, angles), (normals, sines, resistances)
     )
-    return matrix, first, directions
+    weights = np.zeros(first)  # mean of u over the sphere's surface
+    weights[first_rim:first_flow] = angles / angles.sum()
+    return matrix, first, weights, nodes
 
 
 @njit(cache=True)
@@ -208,8 +210,10 @@ def add_sphere(matrix, places, strength, rim, contacts):  # type: ignore[no-unty
             matrix[first_rim + a, first_rim + b] += strength * 0.5 * (ball[a, b] + ball[b, a])
 
 
-def eliminate(matrix: NDArray[np.float64], inside: int, definite: bool) -> NDArray[np.float64]:
-    """Schur complement of the unknowns from `inside` on: energy of the frame with everything inside in balance.
+def eliminate(
+    matrix: NDArray[np.float64], inside: int, weights: NDArray[np.float64], definite: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Schur complement of the unknowns from `inside` on, and a weighted mean of the others over them.
 
     Parameters
     ----------
@@ -217,19 +221,24 @@ def eliminate(matrix: NDArray[np.float64], inside: int, definite: bool) -> NDArr
         Symmetric.
     inside : int
         Unknowns eliminated.
+    weights : ndarray, shape (inside,)
     definite : bool
         Whether the eliminated block is positive definite; with contact flows it is not.
 
     Returns
     -------
     ndarray, shape (n - inside, n - inside)
+        Energy of the frame with everything inside in balance.
+    ndarray, shape (n - inside,)
+        ``weights`` times the unknowns inside, as a function of the frame.
     """
     block, mixed = matrix[:inside, :inside], matrix[:inside, inside:]
     if definite:
         factor, info = lapack.dpotrf(block.T, lower=1, clean=0)
         if info == 0:
-            half = dtrsm(1.0, factor, mixed, lower=1)
-            left: NDArray[np.float64] = matrix[inside:, inside:] - half.T @ half
-            return 0.5 * (left + left.T)
-    left = matrix[inside:, inside:] - mixed.T @ np.linalg.solve(block, mixed)
-    return 0.5 * (left + left.T)
+            half = dtrsm(1.0, factor, np.column_stack((mixed, weights)), lower=1)
+            left: NDArray[np.float64] = matrix[inside:, inside:] - half[:, :-1].T @ half[:, :-1]
+            return 0.5 * (left + left.T), -half[:, -1] @ half[:, :-1]
+    solved = np.linalg.solve(block, mixed)
+    left = matrix[inside:, inside:] - mixed.T @ solved
+    return 0.5 * (left + left.T), -weights @ solved

@@ -1,15 +1,8 @@
-"""System of all cells: loads, block preconditioner, conductivity.
-
-With the temperature E . x + u, u periodic, the energy of load a over cell p is t.K_p t, t = P_p u + (x - x_p)_a on the
-vertices. It is smallest where K u = - sum_p P_p^T K_p (x - x_p)_a; the conductivity is k_ab = sum_p t_a.K_p t_b / V.
-Across a walled axis u vanishes on the two walls of that axis, and the other walls insulate.
-"""
+"""System of all cells: operator, loads, block preconditioner, conjugate gradients."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -17,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import LinearOperator
 
-from etc_engine.box import Box
 from etc_engine.engines.dtem.cell_3d.cells import CellSystem
-from etc_engine.solvers import Limits, Preconditioner, SolveReport, build_preconditioner, solve_energy
+from etc_engine.solvers import Limits, Preconditioner, SolveReport, build_preconditioner, solve_loads
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,24 +19,6 @@ Integers = NDArray[np.int64]
 MOST_ITERATIONS = 2000
 DEPENDENT = 1e-10
 """Bubbles of a coarsely divided facet that depend on each other to this part are one."""
-
-
-@dataclass(frozen=True, eq=False)
-class CellSolution:
-    """Temperatures and conductivity.
-
-    Parameters
-    ----------
-    conductivity : ndarray, shape (3, 3) [W/(m K)]
-        Columns and rows of axes that were not solved are NaN, and off-diagonals of walled boxes.
-    temperatures : dict of int to ndarray, shape (size,)
-        Deviation u from the linear field of unit gradient along each axis [m], over the unknowns of the frame.
-    reports : dict of int to SolveReport
-    """
-
-    conductivity: Floats
-    temperatures: dict[int, Floats]
-    reports: dict[int, SolveReport]
 
 
 @njit(cache=True)
@@ -129,15 +103,16 @@ def _blocks(matrices, starts, unknowns, blocks, block_of, vertices):  # type: ig
     return diagonal, rows, columns, values
 
 
-def cell_preconditioner(system: CellSystem, free: NDArray[np.bool_]) -> Preconditioner:
+def cell_preconditioner(system: CellSystem, fixed: NDArray[np.bool_]) -> Preconditioner:
     """Block-diagonal preconditioner: vertices by multigrid, every edge and facet by its own block.
 
     Parameters
     ----------
     system : CellSystem
-    free : ndarray of bool, shape (size,)
-        Unknowns that are solved for; blocks are free or fixed as a whole.
+    fixed : ndarray of bool, shape (size,)
+        Unknowns that are given; blocks are free or fixed as a whole.
     """
+    free = ~fixed
     start = time.perf_counter()
     sizes = np.diff(system.blocks)
     block_of = np.repeat(np.arange(len(sizes)), sizes)
@@ -175,81 +150,80 @@ def cell_preconditioner(system: CellSystem, free: NDArray[np.bool_]) -> Precondi
     return Preconditioner(apply, coarse.levels if coarse else 1, time.perf_counter() - start)
 
 
-def _fixed_on_walls(system: CellSystem, axis: int) -> NDArray[np.bool_]:
-    """Unknowns on the two walls of an axis: vertices, edges and facets there."""
+def fixed_unknowns(system: CellSystem, axis: int, periodic: bool) -> NDArray[np.bool_]:
+    """Unknowns with a given temperature: one vertex of periodic loads, or all on the two walls of an axis."""
+    if periodic:
+        return np.arange(system.size) == 0
     topology = system.topology
-    second = topology.polygons.cells[:, 1]
-    faces = np.flatnonzero((second == -1 - 2 * axis) | (second == -2 - 2 * axis))
-    on_wall = np.isin(np.repeat(np.arange(len(second)), np.diff(topology.polygons.starts)), faces)
+    low, high = (wall_facets(system, 2 * axis + end) for end in range(2))
+    on_wall = low | high
+    corners = np.repeat(on_wall, np.diff(topology.polygons.starts))
     block = np.zeros(len(system.blocks) - 1, dtype=np.bool_)
-    block[topology.polygons.corners[on_wall]] = True
-    block[system.vertices + topology.edge_of_corner[on_wall]] = True
-    block[system.vertices + topology.edge_count + faces] = True
-    return np.repeat(block, np.diff(system.blocks))
+    block[topology.polygons.corners[corners]] = True
+    block[system.vertices + topology.edge_of_corner[corners]] = True
+    block[system.vertices + topology.edge_count + np.flatnonzero(on_wall)] = True
+    return np.asarray(np.repeat(block, np.diff(system.blocks)))
+
+
+def wall_facets(system: CellSystem, wall: int) -> NDArray[np.bool_]:
+    """Facets on a wall; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end."""
+    return np.asarray(system.topology.polygons.cells[:, 1] == -1 - wall)
+
+
+def apply_cells(system: CellSystem, values: Floats) -> Floats:
+    """K u, the heat that leaves the unknowns, shape (size,)."""
+    result = np.empty(system.size)
+    _apply(system.matrices, system.starts, system.unknowns, np.ascontiguousarray(values), result)
+    return result
+
+
+def cell_loads(system: CellSystem) -> tuple[Floats, Floats]:
+    """sum_p P_p^T K_p arms_p, shape (size, 3), and sum_p arms_p^T K_p arms_p, shape (3, 3)."""
+    load, energy = _load(system.matrices, system.starts, system.unknowns, system.arms, system.size)
+    return load, energy
 
 
 def solve_cells(
-    system: CellSystem, box: Box, axes: tuple[int, ...] = (0, 1, 2), tolerance: float = 1e-8
-) -> CellSolution:
-    """Conductivity along the axes.
+    system: CellSystem,
+    fixed: NDArray[np.bool_],
+    loads: Floats,
+    lift_energies: Floats,
+    tolerance: float,
+) -> tuple[Floats, tuple[SolveReport, ...]]:
+    """Minimize lift_energy + 2 load.u + u.K u for every load, over the unknowns that are not fixed (u = 0 there).
 
     Parameters
     ----------
     system : CellSystem
-    box : Box
-    axes : tuple of int
+    fixed : ndarray of bool, shape (size,)
+    loads : ndarray, shape (size, k)
+    lift_energies : ndarray, shape (k,)
     tolerance : float
-        Relative error of the energy, and so of the conductivity, at which conjugate gradients stop.
+        Relative error of the energies.
+
+    Returns
+    -------
+    u : ndarray, shape (size, k)
+    reports : tuple of SolveReport
 
     Raises
     ------
     ConvergenceError
-        If that is not reached.
+        If the relative error of an energy does not fall to the tolerance.
     """
-    load, energy = _load(system.matrices, system.starts, system.unknowns, system.arms, system.size)
-    result = np.full((3, 3), np.nan)
-    temperatures: dict[int, Floats] = {}
-    reports: dict[int, SolveReport] = {}
-    shared: dict[bool | int, tuple[NDArray[np.bool_], Preconditioner]] = {}
-    apply = _operator(system)
-    for axis in axes:
-        key: bool | int = True if box.periodic[axis] else axis
-        if key not in shared:
-            free = np.ones(system.size, dtype=np.bool_)
-            if box.periodic[axis]:
-                free[0] = False  # temperatures are known up to a constant
-            else:
-                free = ~_fixed_on_walls(system, axis)
-            shared[key] = (free, cell_preconditioner(system, free))
-        free, preconditioner = shared[key]
-        temperatures[axis] = np.zeros(system.size)
-        if not free.any():
-            continue
-        solution, reports[axis] = solve_energy(
-            LinearOperator(
-                (system.size, system.size), matvec=lambda v, f=free: np.where(f, apply(np.where(f, v, 0.0)), v)
-            ),
-            np.where(free, -load[:, axis], 0.0),
-            float(energy[axis, axis]),
-            preconditioner=preconditioner,
-            tolerance=tolerance,
-            limits=Limits(max_iterations=MOST_ITERATIONS),
-            conserved=np.where(free & (np.arange(system.size) < system.vertices), 1.0, 0.0),
-        )
-        temperatures[axis] = solution
-    for a in axes:
-        for b in axes:
-            if a == b or all(box.periodic):
-                u, v = temperatures[a], temperatures[b]
-                total = energy[a, b] + u @ load[:, b] + v @ load[:, a] + u @ apply(v)
-                result[a, b] = total / box.volume
-    return CellSolution(result, temperatures, reports)
+    if fixed.all():
+        return np.zeros_like(loads), (SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0),) * loads.shape[1]
 
+    def free_part(values: Floats) -> Floats:
+        return np.where(fixed, values, apply_cells(system, np.where(fixed, 0.0, values)))
 
-def _operator(system: CellSystem) -> Callable[[Floats], Floats]:
-    def apply(values: Floats) -> Floats:
-        result = np.empty(system.size)
-        _apply(system.matrices, system.starts, system.unknowns, np.ascontiguousarray(values), result)
-        return result
-
-    return apply
+    u, reports = solve_loads(
+        LinearOperator((system.size, system.size), matvec=free_part, dtype=np.float64),
+        np.where(fixed[:, None], 0.0, -loads),
+        lift_energies,
+        preconditioner=cell_preconditioner(system, fixed),
+        tolerance=tolerance,
+        limits=Limits(max_iterations=MOST_ITERATIONS),
+        conserved=np.where(~fixed & (np.arange(system.size) < system.vertices), 1.0, 0.0),
+    )
+    return u, reports

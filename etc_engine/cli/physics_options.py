@@ -1,0 +1,199 @@
+"""Options of contacts from load, gas and radiation, and the medium they describe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from etc_engine.medium.medium import Pores
+    from etc_engine.medium.network import ContactNetwork
+    from etc_engine.packing.particles import ParticlePacking
+
+OPTIONS = (
+    click.option("--rule", help="Contact rule: overlap, bonded, hertz or load; by default what the options fit."),
+    click.option("--youngs-modulus", type=float, help="Young's modulus of the particles [Pa]."),
+    click.option("--poisson-ratio", type=float, help="Poisson's ratio of the particles."),
+    click.option(
+        "--simulated-modulus", type=float, help="With --rule hertz: Young's modulus that the DEM run used [Pa]."
+    ),
+    click.option("--load", type=float, help="With --rule load: mean stress carried by the contacts [Pa]."),
+    click.option("--roughness", help="Height [m], slope and hardness [Pa] of rough contacts: 1e-6,0.1,4e9."),
+    click.option("--material", help="Solid by name instead of --conductivity; needs --temperature."),
+    click.option("--gas", help="Gas in the pores by name, such as helium."),
+    click.option("--pressure", type=float, help="Pressure of the gas [Pa]; 0 is vacuum."),
+    click.option("--temperature", type=float, help="Temperature of properties and radiation [K]."),
+    click.option("--accommodation", type=float, help="Thermal accommodation coefficient of the surfaces, up to 1."),
+    click.option("--emissivity", type=float, help="Emissivity of the particles: facing surfaces radiate."),
+)
+
+
+NEEDED: dict[str, tuple[str, ...]] = {
+    "overlap": (),
+    "bonded": ("contact_angle",),
+    "coordination": ("contact_angle", "coordination"),
+    "hertz": (),
+    "softened": ("youngs_modulus", "poisson_ratio"),
+    "load": ("load", "youngs_modulus", "poisson_ratio"),
+}
+"""What every contact rule of the command needs."""
+
+
+@dataclass(frozen=True)
+class PhysicsWords:
+    """What the options say of contacts, solid and pores."""
+
+    rule: str | None = None
+    youngs_modulus: float | None = None
+    poisson_ratio: float | None = None
+    simulated_modulus: float | None = None
+    load: float | None = None
+    roughness: str | None = None
+    material: str | None = None
+    gas: str | None = None
+    pressure: float | None = None
+    temperature: float | None = None
+    accommodation: float | None = None
+    emissivity: float | None = None
+
+    @property
+    def contact_rule(self) -> str | None:
+        """The rule asked for; ``load`` if only a load is given."""
+        return "load" if self.rule is None and self.load is not None else self.rule
+
+    def network(self, packing: ParticlePacking, half_angle: float | None, bond_gap: float) -> ContactNetwork:
+        """Contacts by the rule asked for.
+
+        Raises
+        ------
+        InputError
+            If the rule is unknown, or an option that it needs is missing, or one means nothing to it.
+        """
+        from etc_engine.errors import InputError
+        from etc_engine.medium.rules import find_rule
+
+        word = self.contact_rule or ("overlap" if half_angle is None else "bonded")
+        rule = find_rule(word)
+        values = {
+            "contact_angle": half_angle,
+            "youngs_modulus": self.youngs_modulus,
+            "poisson_ratio": self.poisson_ratio,
+            "simulated_modulus": self.simulated_modulus,
+            "load": self.load,
+        }
+        given = {name: value for name, value in values.items() if value is not None}
+        used = set(rule.keys) | ({"youngs_modulus", "poisson_ratio"} if self.roughness else set())
+        for name in given:
+            if name not in used:
+                raise InputError(f"{_option(name)} means nothing to the contact rule {word}")
+        softened = word == "hertz" and self.simulated_modulus is not None
+        for name in NEEDED["softened" if softened else word]:
+            if name not in given:
+                raise InputError(f"the contact rule {word} also needs {_option(name)}")
+        if "bond_gap" in rule.keys:
+            given["bond_gap"] = bond_gap
+        return rule.contacts(packing, **{rule.keys[name]: value for name, value in given.items() if name in rule.keys})
+
+    def roughened(self, network: ContactNetwork, conductivity: Any, pores: Pores) -> ContactNetwork:
+        """The contacts with the area resistance of rough surfaces, if they are.
+
+        Raises
+        ------
+        InputError
+            If the words cannot be read, or the elastic constants are missing.
+        """
+        if self.roughness is None:
+            return network
+        import numpy as np
+
+        from etc_engine.errors import InputError
+        from etc_engine.laws.roughness import Roughness
+        from etc_engine.medium.loaded import Stiffness, with_roughness
+
+        try:
+            height, slope, hardness = (float(word) for word in self.roughness.split(","))
+        except ValueError:
+            raise InputError(
+                f"--roughness takes height, slope and hardness, such as 1e-6,0.1,4e9: found {self.roughness!r}"
+            ) from None
+        if self.youngs_modulus is None or self.poisson_ratio is None:
+            raise InputError("--roughness also needs --youngs-modulus and --poisson-ratio: they give the pressures")
+        kappa = np.broadcast_to(np.asarray(conductivity, dtype=np.float64), (network.packing.count,))
+        stiffness = Stiffness(self.youngs_modulus, self.poisson_ratio)
+        gas = (pores.conductivity, pores.jump_length)
+        return with_roughness(network, Roughness(height, slope, hardness=hardness), stiffness, kappa, gas)
+
+    def pores(self, packing: ParticlePacking, conductivity: float) -> Pores:
+        """The pores at the temperature and pressure asked for.
+
+        Raises
+        ------
+        InputError
+            If a gas comes beside a conductivity, or something that it needs is missing.
+        """
+        from etc_engine.errors import InputError
+        from etc_engine.medium.conditions import Conditions, pores_at
+
+        if self.gas is not None and conductivity > 0.0:
+            raise InputError("--gas and --pore-conductivity both say what fills the pores: leave one of them out")
+        return pores_at(
+            Conditions(
+                self.temperature,
+                self.gas,
+                self.pressure,
+                self.accommodation,
+                self._atomic_mass(),
+                self.emissivity,
+            ),
+            packing,
+            conductivity,
+        )
+
+    def solid(self) -> float | None:
+        """Conductivity of the material named, at the temperature asked for; None without a name.
+
+        Raises
+        ------
+        InputError
+        """
+        if self.material is None:
+            return None
+        from etc_engine.errors import InputError
+        from etc_engine.materials import find_solid
+
+        if self.temperature is None:
+            raise InputError("--material needs --temperature: its conductivity depends on it")
+        return float(find_solid(self.material).conductivity.at(self.temperature))
+
+    def _atomic_mass(self) -> float | None:
+        from etc_engine.materials import find_solid
+
+        return None if self.material is None else find_solid(self.material).atomic_mass
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What was given, for the record of a result."""
+        from dataclasses import asdict
+
+        return {name: value for name, value in asdict(self).items() if value is not None and name != "rule"}
+
+
+def physics_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options; the command gets them as one argument ``physics``."""
+
+    @wraps(command)
+    def gathered(*args: Any, **given: Any) -> Any:
+        words = PhysicsWords(**{name: given.pop(name) for name in PhysicsWords.__dataclass_fields__})
+        return command(*args, physics=words, **given)
+
+    for option in reversed(OPTIONS):
+        gathered = option(gathered)
+    return gathered
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")

@@ -1,0 +1,83 @@
+"""``solve`` with contacts from load, materials and gases: what is recorded, what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from etc_engine.cli import run
+
+pytest.importorskip("CoolProp")
+ELASTIC = ["--youngs-modulus", "90e9", "--poisson-ratio", "0.24"]
+
+
+@pytest.fixture
+def bed(tmp_path):
+    """Simple cubic array of slightly overlapping spheres, as CSV."""
+    r, n = 0.5e-3, 3
+    grid = (np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) + 0.5) * 2.0 * r * 0.9999
+    file = tmp_path / "bed.csv"
+    rows = "\n".join(",".join(repr(float(v)) for v in (*x, r)) for x in grid)
+    file.write_text("x,y,z,radius\n" + rows + "\n")
+    return [str(file), "--box", ",".join([repr(2.0 * r * n * 0.9999)] * 3), "--periodic", "xyz", "--engine", "pipe"]
+
+
+def solved(capfd, *arguments):
+    assert run(["solve", *arguments, "--json"]) == 0
+    return json.loads(capfd.readouterr().out)
+
+
+def test_hertz_is_sqrt2_narrower_than_the_lens(bed, capfd):
+    """Small contacts conduct in proportion to their radius."""
+    lens = solved(capfd, *bed)
+    hertz = solved(capfd, *bed, "--rule", "hertz")
+    assert (lens["contact_rule"], hertz["contact_rule"]) == ("overlap", "hertz")
+    assert lens["contacts"] == hertz["contacts"] == 81
+    assert lens["conductivity"] / hertz["conductivity"] == pytest.approx(np.sqrt(2.0), rel=0.01)
+
+
+def test_softened_run_and_load(bed, capfd):
+    hertz = solved(capfd, *bed, "--rule", "hertz")
+    soft = solved(capfd, *bed, "--rule", "hertz", *ELASTIC, "--simulated-modulus", "90e6")
+    assert soft["conductivity"] / hertz["conductivity"] == pytest.approx(0.1, rel=0.02)
+    load = solved(capfd, *bed, "--load", "1e6", *ELASTIC)
+    assert load["contact_rule"] == "load" and load["load"] == 1e6 and load["youngs_modulus"] == 90e9
+    more = solved(capfd, *bed, "--load", "8e6", *ELASTIC)
+    assert more["conductivity"] / load["conductivity"] == pytest.approx(2.0, rel=0.01)  # c ~ F^(1/3)
+
+
+def test_rough_contacts_conduct_less(bed, capfd):
+    smooth = solved(capfd, *bed, "--load", "1e6", *ELASTIC)
+    rough = solved(capfd, *bed, "--load", "1e6", *ELASTIC, "--roughness", "1e-6,0.1,4e9")
+    assert rough["conductivity"] < smooth["conductivity"]
+
+
+def test_a_material_at_its_temperature(bed, capfd):
+    one = solved(capfd, *bed)
+    steel = solved(capfd, *bed, "--material", "SS316", "--temperature", "600")
+    assert steel["conductivity"] / one["conductivity"] == pytest.approx(19.9756, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--rule", "hertzian"], "unknown contact rule"),
+        (["--rule", "load"], "also needs --load"),
+        (["--rule", "overlap", "--youngs-modulus", "1e9"], "means nothing to the contact rule overlap"),
+        (["--rule", "hertz", "--simulated-modulus", "1e8"], "also needs --youngs-modulus"),
+        (["--load", "1e6", "--youngs-modulus", "90e9"], "also needs --poisson-ratio"),
+        (["--roughness", "1e-6"], "takes height, slope and hardness"),
+        (["--gas", "helium", "--pressure", "1e5"], "needs a temperature"),
+        (["--gas", "helium", "--pressure", "1e5", "--temperature", "300", "--pore-conductivity", "1"], "leave one"),
+        (["--pressure", "1e5"], "give the gas by name"),
+        (["--emissivity", "0.8"], "needs a temperature"),
+        (["--material", "copper"], "needs --temperature"),
+        (["--material", "copper", "--temperature", "300", "--conductivity", "5"], "leave one of them out"),
+    ],
+)
+def test_refusals_are_one_line(bed, options, message, capfd):
+    assert run(["solve", *bed, *options]) == 2
+    error = capfd.readouterr().err
+    assert message in error and error.count("\n") == 1
