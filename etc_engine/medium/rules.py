@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -166,6 +167,12 @@ class Rule:
     contacts: Callable[..., ContactNetwork]
     keys: Mapping[str, str]
     dimensions: tuple[int, ...] = (2, 3)
+
+    @property
+    def required(self) -> tuple[str, ...]:
+        """The keys that the function has no default for."""
+        arguments = inspect.signature(self.contacts).parameters
+        return tuple(key for key, name in self.keys.items() if arguments[name].default is inspect.Parameter.empty)
 
 
 ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", "wall_youngs_modulus", "wall_poisson_ratio")}

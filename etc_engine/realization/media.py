@@ -65,13 +65,13 @@ def _network(
 ) -> ContactNetwork:
     """Contacts for some values; ``found`` holds those that were made before."""
     rule = find_rule(word)
-    own = {key: values[key] for key in rule.keys}
+    own = {key: values[key] for key in rule.keys if key in values}
     resistance, angle = values.get("contact_resistance", 0.0), own.get("contact_angle", 0.0)
     whole = (*own.values(), resistance)
     if whole not in found:
         pairs = tuple(value for key, value in own.items() if key != "contact_angle")
         if pairs not in found:
-            found[pairs] = rule.contacts(packing, **{argument: own[key] for key, argument in rule.keys.items()})
+            found[pairs] = rule.contacts(packing, **{rule.keys[key]: value for key, value in own.items()})
         network = found[pairs]
         if "contact_angle" in own:
             network = network.with_half_angle(angle)

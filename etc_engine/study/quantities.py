@@ -26,6 +26,7 @@ from etc_engine.study.schema import (
 )
 
 Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
+PoissonRatio = Annotated[float, Field(strict=True, ge=0.0, le=0.5)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 T = TypeVar("T", bound="QuantityTable")
 
@@ -127,6 +128,23 @@ QUANTITIES: Mapping[str, Quantity] = {
             default=1e-6,
         ),
         Quantity("contacts.coordination", "1", "mean coordination number", "contacts", Positive, POSITIVE),
+        *(
+            Quantity(f"contacts.{whose}{key}", units, f"{name} of the {what}", "contacts", check, allowed)
+            for whose, what in (("", "particles"), ("wall_", "walls"))
+            for key, units, name, check, allowed in (
+                ("youngs_modulus", "Pa", "Young's modulus", Positive, POSITIVE),
+                ("poisson_ratio", "1", "Poisson ratio", PoissonRatio, "a number from 0 to 0.5"),
+            )
+        ),
+        Quantity(
+            "contacts.simulated_modulus",
+            "Pa",
+            "Young's modulus of the run that made the packing",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.load", "Pa", "mean stress carried by the contacts", "contacts", Positive, POSITIVE),
         Quantity(
             "contacts.contact_resistance",
             "K W-1",

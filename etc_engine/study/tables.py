@@ -121,7 +121,7 @@ class ContactsTable(QuantityTable):
 
     @model_validator(mode="after")
     def _check(self) -> ContactsTable:
-        for key in RULES[self.rule].keys:
+        for key in RULES[self.rule].required:
             if getattr(self, key) is None:
                 raise ValueError(f"rule = {self.rule!r} needs {key}, {QUANTITIES[key].allowed}")
         return self
