@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.contact_options import ContactWords, contact_options
 from etc_engine.cli.particle_options import (
     SampleWords,
     particle_options,
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from etc_engine.realization import Engine
 
 BOND_GAP = 1e-6
+ESTIMATED = 5_000
+"""Up to so many particles the discretization error is estimated where a method can; it takes three times as long."""
+LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fill_height": "fill height [m]"}
 
 
 @click.command("solve")
@@ -37,9 +41,15 @@ BOND_GAP = 1e-6
 @particle_options
 @click.option("--axis", help="Load axis: x (the default), y, z or all.")
 @click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
-@click.option("--method", help="Of dtem: chord, standard, enhanced, arc or exact; of pipe: chord or uniform.")
+@click.option(
+    "--method",
+    help="Of dtem: chord, standard, enhanced, arc, exact; where the pores conduct cell (disks) or facets (spheres); "
+    "of pipe: chord or uniform.",
+)
 @click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
+@click.option("--degree", type=int, help="Polynomial degree on the edges of cells, with --method cell: 1 to 5.")
+@click.option("--bounds", is_flag=True, help="Rigorous bounds too, with --method cell and few disks.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
 )
@@ -62,16 +72,21 @@ BOND_GAP = 1e-6
     show_default=True,
     help="Resistance of every contact, walls included, in 2D per unit thickness [K/W, m K/W].",
 )
+@contact_options
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with particles, contacts and fields.")
 @click.option("--vtk", type=click.Path(path_type=Path), help="VTK PolyData (.vtp) for ParaView.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the temperature field.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.option("--full", is_flag=True, help="With --json, the temperature of every contact too.")
 def solve_command(
     particles: Path,
     words: SampleWords,
+    dumped: ContactWords,
     output: Path | None,
     vtk: Path | None,
     plot: Path | None,
+    as_json: bool,
+    full: bool,
     **given: Any,
 ) -> None:
     """Effective conductivity of the particles in a file.
@@ -82,17 +97,19 @@ def solve_command(
     periodic along it.
     """
     start = time.perf_counter()
+    import numpy as np
+
     from etc_engine.cli.options import print_json
     from etc_engine.realization import field_along, find_engine
 
-    as_json = given.pop("as_json")
     asked = _Asked(**given)
     asked.refuse_old_words()
     engine = find_engine(asked.engine)
     outputs = _Outputs(output, vtk, plot)
     outputs.check(particles)
     table = read_sample(particles, words)
-    medium = asked.medium(table, particles)
+    elastic = asked.physics.youngs_modulus, asked.physics.poisson_ratio
+    medium = asked.medium(table, particles, dumped.network(table, words.frame, *elastic))
     axes = _load_axes(asked.axis, medium)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
@@ -100,13 +117,18 @@ def solve_command(
     record = _record(asked, method, result, field, axes)
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
-    _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
+    if not medium.pores.conduct:
+        _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
     gap = 0.0 if asked.contact_angle is None else asked.bond_gap
-    warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
-    warn_of_sample(table, [axis for axis in axes if not medium.box.periodic[axis]], gap)
-    warn_of_excess(result.tensor, medium.conductivity)
-    _write(outputs, field, record)
+    if dumped.contacts is None:
+        warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
+    driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
+    warn_of_sample(table, driven, gap)
+    warn_of_excess(result.tensor, np.append(medium.conductivity, medium.pores.conductivity))
+    _write(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
+    if not full:
+        del record["contact_temperatures"]
     if as_json:
         print_json(record)
     else:
@@ -122,6 +144,8 @@ class _Asked:
     method: str | None
     pipe_resistance: str | None
     modes: int | None
+    degree: int | None
+    bounds: bool
     contact_angle: float | None
     bond_gap: float
     conductivity: float | None
@@ -141,8 +165,8 @@ class _Asked:
         if self.contact_resistance > 0.0 and self.physics.roughness is not None:
             raise InputError("--contact-resistance and --roughness both resist at contacts: leave one of them out")
 
-    def medium(self, table: ParticleTable, particles: Path) -> Medium:
-        """The particles of a file with contacts and materials."""
+    def medium(self, table: ParticleTable, particles: Path, dumped: ContactNetwork | None) -> Medium:
+        """The particles of a file with contacts, those of a contact dump if there is one, and materials."""
         from math import radians
 
         import numpy as np
@@ -154,11 +178,13 @@ class _Asked:
             raise InputError("--material and --conductivity both say what the particles are: leave one of them out")
         if self.conductivity is not None and table.conductivity is not None:
             raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
+        if dumped is not None and (self.contact_angle is not None or self.physics.contact_rule is not None):
+            raise InputError("--contacts and --contact-angle or --rule say how wide contacts are: give one of them")
         solid = self.physics.solid() if self.conductivity is None else self.conductivity
         given = 1.0 if solid is None else solid
         kappa = np.asarray(given if table.conductivity is None else table.conductivity)
         half_angle = None if self.contact_angle is None else radians(self.contact_angle)
-        network = self.physics.network(table.packing, half_angle, self.bond_gap)
+        network = dumped or self.physics.network(table.packing, half_angle, self.bond_gap)
         pores = self.physics.pores(table.packing, self.pore_conductivity)
         if self.contact_resistance > 0.0 or self.physics.roughness is None:
             network = network.with_resistance(self.contact_resistance)
@@ -171,8 +197,14 @@ class _Asked:
         from etc_engine.realization import effective_conductivity
 
         if not engine.needs_contacts:
-            raise InputError(f"engine {engine.name} resolves the pores: use the command homogenize")
-        options = {} if self.modes is None else {"modes": self.modes}
+            raise InputError(
+                f"engine {engine.name} resolves the pores: use etc-engine homogenize FILE --engine {engine.name} "
+                "--matrix ... --inclusion ..."
+            )
+        given = {"modes": self.modes, "degree": self.degree, "bounds": self.bounds or None}
+        options = {name: value for name, value in given.items() if value is not None}
+        if "error_estimate" in engine.find_method(method).options and medium.packing.count <= ESTIMATED:
+            options["error_estimate"] = True
         return effective_conductivity(medium, engine=engine.name, method=method, axes=axes, **options)
 
 
@@ -212,7 +244,7 @@ class _Outputs:
                 check_place(path, particles)
 
 
-def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any]) -> None:
+def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any], table: ParticleTable) -> None:
     """Write what was asked for: every file whole, or none of them."""
     from etc_engine.durable.files import replacing
 
@@ -220,6 +252,7 @@ def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any]) -> N
         if outputs.netcdf is not None:
             from etc_engine.durable.provenance import engine_version
             from etc_engine.output.single import solve_dataset
+            from etc_engine.particle_files.netcdf import with_ids
 
             plain = {key: value for key, value in record.items() if key != "contact_temperatures"}
             plain |= {f"conductivity_{axis}": k for axis, k in plain.pop("conductivity_per_axis").items()}
@@ -230,7 +263,7 @@ def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any]) -> N
                 plain["conductivity_tensor"] = plain["conductivity_tensor"].ravel()
             plain["command"] = " ".join(["etc-engine", *sys.argv[1:]])
             file = files.enter_context(replacing(outputs.netcdf))
-            solve_dataset(field, plain).to_netcdf(file, engine="netcdf4")
+            with_ids(solve_dataset(field, plain), table).to_netcdf(file, engine="netcdf4")
         if outputs.vtk is not None:
             from etc_engine.output.vtk import write_vtp
 
@@ -273,9 +306,11 @@ def _record(
 
     from etc_engine.box import AXES
     from etc_engine.realization import Status
+    from etc_engine.structure.filling import find_filling
 
     medium, network, axis = field.medium, field.medium.links, axes[0]
     percolates = bool(result.spans[axis])
+    status = Status.OK if percolates else Status.NOT_PERCOLATING
     record: dict[str, Any] = {
         "engine": asked.engine,
         "method": method,
@@ -291,15 +326,17 @@ def _record(
     return record | {
         "particles": medium.packing.count,
         "density": medium.packing.density,
+        "fill_height": find_filling(medium.packing).fill_height,
         "pore_conductivity": medium.pores.conductivity,
         "contact_rule": network.rule,
         **asked.physics.record,
         "contacts": int(np.count_nonzero(network.angles[:, 0])),
         "links": network.count,
-        "wall_contacts": len(network.walls_of(axis)),
+        "wall_contacts": int(np.count_nonzero(network.wall_angles[network.walls_of(axis)])),
         "unknowns": result.unknowns,
         "percolates": percolates,
-        "status": int(Status.OK if percolates else Status.NOT_PERCOLATING),
+        "status": int(status),
+        "status_name": status.name.lower(),
         "iterations": result.iterations,
         "relative_energy_error": result.relative_energy_error,
         "contact_temperatures": [
@@ -311,7 +348,7 @@ def _record(
 
 def _print_table(record: dict[str, Any]) -> None:
     for name, value in record.items():
-        if name == "contact_temperatures":
+        if name in ("contact_temperatures", "status"):  # the name of the status is printed
             continue
         if name == "conductivity_tensor":
             text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
@@ -322,5 +359,5 @@ def _print_table(record: dict[str, Any]) -> None:
         else:
             text = f"{value:.8g}" if isinstance(value, float) else str(value)
         unit = " W/(m K)" if name.startswith("conductivity") else ""
-        label = "wall contacts on axis" if name == "wall_contacts" else name.replace("_", " ")
+        label = LABELS.get(name, name.replace("_", " "))
         click.echo(f"{label:24s}{text}{unit}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -78,10 +77,15 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
             f"particle {pairs[row, side]} overlaps particle {pairs[row, 1 - side]} so far that the contact half-angle "
             f"is {np.degrees(angles[row, side]):.2f} degrees; it must be below 90"
         )
-    wall_particles, walls, wall_distances = wall_distances_within(packing, ROUND_OFF_OVERLAP, -1.0)
-    wall_radii = radii[wall_particles]
-    wall_angles = 2.0 * np.arcsin(np.sqrt(np.clip((wall_radii - wall_distances) / (2.0 * wall_radii), 0.0, 1.0)))
-    return _without_resistance(packing, (pairs, shifts, angles), (wall_particles, walls, wall_angles), "overlap")
+    return perfect_contacts(packing, (pairs, shifts, angles), overlap_walls(packing), "overlap")
+
+
+def overlap_walls(packing: ParticlePacking) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Contacts that walls cut out of particles: (particle, wall, half-angle), cos alpha = distance/R."""
+    particles, walls, distances = wall_distances_within(packing, ROUND_OFF_OVERLAP, -1.0)
+    radii = packing.radii[particles]
+    angles = 2.0 * np.arcsin(np.sqrt(np.clip((radii - distances) / (2.0 * radii), 0.0, 1.0)))
+    return particles, walls, angles
 
 
 def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float = 1e-6) -> ContactNetwork:
@@ -161,29 +165,38 @@ class Rule:
         (packing, **values) -> ContactNetwork.
     keys : mapping of str to str
         Key of a study -> argument of the function, angles in radians.
+    optional : tuple of str
+        Keys that may be left out.
     dimensions : tuple of int
     """
 
     contacts: Callable[..., ContactNetwork]
     keys: Mapping[str, str]
+    optional: tuple[str, ...] = ()
     dimensions: tuple[int, ...] = (2, 3)
 
     @property
-    def required(self) -> tuple[str, ...]:
-        """The keys that the function has no default for."""
-        arguments = inspect.signature(self.contacts).parameters
-        return tuple(key for key, name in self.keys.items() if arguments[name].default is inspect.Parameter.empty)
+    def needs(self) -> tuple[str, ...]:
+        """Keys that a study has to give."""
+        return tuple(key for key in self.keys if key not in self.optional)
 
 
-ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", "wall_youngs_modulus", "wall_poisson_ratio")}
+WALL = ("wall_youngs_modulus", "wall_poisson_ratio")
+ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", *WALL)}
 """Elastic constants of the particles and of the walls, as a study and as a rule spells them."""
 
 RULES: Mapping[str, Rule] = {
     "overlap": Rule(overlap_contacts, {}),
     "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
-    "hertz": Rule(hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}),
-    "load": Rule(load_contacts, {"load": "load", **ELASTIC, "bond_gap": "bond_gap", "coordination": "coordination"}),
+    "hertz": Rule(
+        hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}, (*ELASTIC, "simulated_modulus")
+    ),
+    "load": Rule(
+        load_contacts,
+        {"load": "load", **ELASTIC, "bond_gap": "bond_gap", "coordination": "coordination"},
+        (*WALL, "coordination"),
+    ),
 }
 
 
@@ -205,10 +218,10 @@ def _bonded(near: Neighbors, half_angle: float, rule: str) -> ContactNetwork:
     check_half_angle(half_angle)
     links = near.pairs, near.shifts, np.full(near.pairs.shape, float(half_angle))
     at_walls = near.wall_particles, near.walls, np.full(near.walls.size, float(half_angle))
-    return _without_resistance(near.packing, links, at_walls, rule)
+    return perfect_contacts(near.packing, links, at_walls, rule)
 
 
-def _without_resistance(
+def perfect_contacts(
     packing: ParticlePacking,
     links: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],
     at_walls: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]],

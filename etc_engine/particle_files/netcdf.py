@@ -50,7 +50,13 @@ def packing_dataset(table: ParticleTable, attributes: Mapping[str, Any] | None =
         "box": list(packing.box.lengths),
         "periodic": packing.box.periodic_axes,
     }
-    dataset = xarray.Dataset(variables, attrs=general | dict(attributes or {}))
+    return with_ids(xarray.Dataset(variables, attrs=general | dict(attributes or {})), table)
+
+
+def with_ids(dataset: xarray.Dataset, table: ParticleTable) -> xarray.Dataset:
+    """The dataset with the ids of the particles as the coordinate ``particle``, and their low corner in the file."""
+    if table.origin and any(table.origin):
+        dataset = dataset.assign_attrs(origin=list(table.origin))
     if table.ids is None:
         return dataset
     return dataset.assign_coords(particle=("particle", table.ids, {"long_name": "id of the particle in its file"}))

@@ -65,7 +65,7 @@ class Runner:
                 (Path(folder) / UPLOAD).write_bytes(particles)
                 if format_to_read(Path(folder) / UPLOAD) not in (CSV, DUMP):
                     raise InputError("upload: expected a CSV file or a LAMMPS/LIGGGHTS text dump, found another format")
-                line = ["solve", UPLOAD, "--json", *options]
+                line = ["solve", UPLOAD, "--json", "--full", *options]
                 printed, said = self._run(line, Path(folder), self.settings.limits.solve_seconds)
         finally:
             self._waiting.release()

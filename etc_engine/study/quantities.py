@@ -26,8 +26,11 @@ from etc_engine.study.schema import (
 )
 
 Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
-PoissonRatio = Annotated[float, Field(strict=True, ge=0.0, le=0.5)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+SHARE = "a number from 0 to 1"
+Accommodation = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
+Poisson = Annotated[float, Field(strict=True, gt=-1.0, le=0.5)]
+POISSON = "a number above -1, up to 0.5"
 T = TypeVar("T", bound="QuantityTable")
 
 
@@ -128,23 +131,6 @@ QUANTITIES: Mapping[str, Quantity] = {
             default=1e-6,
         ),
         Quantity("contacts.coordination", "1", "mean coordination number", "contacts", Positive, POSITIVE),
-        *(
-            Quantity(f"contacts.{whose}{key}", units, f"{name} of the {what}", "contacts", check, allowed)
-            for whose, what in (("", "particles"), ("wall_", "walls"))
-            for key, units, name, check, allowed in (
-                ("youngs_modulus", "Pa", "Young's modulus", Positive, POSITIVE),
-                ("poisson_ratio", "1", "Poisson ratio", PoissonRatio, "a number from 0 to 0.5"),
-            )
-        ),
-        Quantity(
-            "contacts.simulated_modulus",
-            "Pa",
-            "Young's modulus of the run that made the packing",
-            "contacts",
-            Positive,
-            POSITIVE,
-        ),
-        Quantity("contacts.load", "Pa", "mean stress carried by the contacts", "contacts", Positive, POSITIVE),
         Quantity(
             "contacts.contact_resistance",
             "K W-1",
@@ -154,6 +140,53 @@ QUANTITIES: Mapping[str, Quantity] = {
             NOT_NEGATIVE,
             default=0.0,
             plane="m K W-1",
+        ),
+        Quantity(
+            "contacts.youngs_modulus",
+            "Pa",
+            "Young's modulus of the particles",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.poisson_ratio", "1", "Poisson's ratio of the particles", "contacts", Poisson, POISSON),
+        Quantity("contacts.wall_youngs_modulus", "Pa", "Young's modulus of the walls", "contacts", Positive, POSITIVE),
+        Quantity("contacts.wall_poisson_ratio", "1", "Poisson's ratio of the walls", "contacts", Poisson, POISSON),
+        Quantity(
+            "contacts.simulated_modulus",
+            "Pa",
+            "Young's modulus of the run that made the overlaps",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.load", "Pa", "mean stress that the contacts carry", "contacts", Positive, POSITIVE),
+        Quantity(
+            "contacts.roughness.height",
+            "m",
+            "rms roughness height, of both surfaces together",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_height",
+        ),
+        Quantity(
+            "contacts.roughness.slope",
+            "1",
+            "rms roughness slope, of both surfaces together",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_slope",
+        ),
+        Quantity(
+            "contacts.roughness.hardness",
+            "Pa",
+            "micro-hardness of the softer surface",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_hardness",
         ),
         Quantity(
             "particles.conductivity",
@@ -180,7 +213,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             "number fraction of the particles of the second material",
             "medium",
             Share,
-            "a number from 0 to 1",
+            SHARE,
             name="mixture_fraction",
         ),
         Quantity(
@@ -193,6 +226,17 @@ QUANTITIES: Mapping[str, Quantity] = {
             name="pore_conductivity",
             default=0.0,
         ),
+        Quantity("pores.pressure", "Pa", "pressure of the gas", "medium", NotNegative, NOT_NEGATIVE),
+        Quantity(
+            "pores.accommodation",
+            "1",
+            "thermal accommodation coefficient of the surfaces",
+            "medium",
+            Accommodation,
+            "a number above 0, up to 1",
+        ),
+        Quantity("radiation.emissivity", "1", "emissivity of the particles", "medium", Share, SHARE),
+        Quantity("conduction.temperature", "K", "temperature", "medium", Positive, POSITIVE),
     )
 }
 """The rows by the names of their dimensions, in the order of the dimensions of a result."""

@@ -18,7 +18,7 @@ BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
 
 
 def test_netcdf_of_a_single_solve_opens_with_labels(etc_engine, tmp_path):
-    done = etc_engine("solve", TABLE_2, "--box", "1,1", "-o", tmp_path / "a.nc", "--json")
+    done = etc_engine("solve", TABLE_2, "--box", "1,1", "-o", tmp_path / "a.nc", "--json", "--full")
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         assert dict(data.sizes) == {"particle": 12, "contact": 17, "side": 2, "wall_contact": 7}
         temperatures = [entry["temperature"] for entry in json.loads(done.stdout)["contact_temperatures"]]
