@@ -282,9 +282,9 @@ ENGINES: Mapping[str, Engine] = {
                     options=("modes",),
                 ),
                 "cell": Method(
-                    "Laguerre cells: disks and the fluid between them",
+                    "Laguerre cells: disks and the fluid between them; where the pores insulate, chord",
                     (2,),
-                    pores=MUST,
+                    pores=MAY,
                     transient=True,
                     options=("degree", "error_estimate", "bounds"),
                 ),

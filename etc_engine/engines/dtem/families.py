@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from etc_engine.engines.dtem import conductivity as elements
@@ -61,28 +61,44 @@ FAMILIES: Mapping[tuple[str, int], Family] = {
 """Families by method and dimension; every other method is one of `CONTACTS`."""
 
 
-def family_of(method: str, dimension: int) -> Family:
-    """The family of a method."""
-    return FAMILIES.get((method, dimension), CONTACTS)
+LIMIT = "chord"
+"""Where the pores insulate, a family that needs them leaves its media to `CONTACTS` by this method."""
+
+
+def family_of(method: str, medium: Medium) -> tuple[Family, str]:
+    """The family that solves a medium by a method, and the method it uses."""
+    family = FAMILIES.get((method, medium.dimension), CONTACTS)
+    if family is not CONTACTS and not medium.pores.conduct:
+        return CONTACTS, LIMIT
+    return family, method
 
 
 def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
     """Effective conductivity of media on one packing, one result per medium."""
-    return family_of(conduction.method, media[0].dimension).solve(media, conduction)
+    found: dict[int, Result] = {}
+    for conduct in (True, False):
+        rows = [row for row, medium in enumerate(media) if medium.pores.conduct == conduct]
+        if rows:
+            family, method = family_of(conduction.method, media[rows[0]])
+            options = conduction.options if method == conduction.method else {}
+            task = replace(conduction, method=method, options=options)
+            found |= dict(zip(rows, family.solve([media[row] for row in rows], task), strict=True))
+    return [found[row] for row in range(len(media))]
 
 
 def field_of(medium: Medium, method: str, solution: Any, load: int) -> ParticleField:
     """Temperatures and heat flows of one load of a solution."""
-    return family_of(method, medium.dimension).recover(medium, solution, load)
+    return family_of(method, medium)[0].recover(medium, solution, load)
 
 
 def system_of(medium: Medium, walls: Mapping[str, Any], *, method: str, **options: Any) -> ParticleSystem:
     """A medium ready to be marched in time, by a method with a transient form."""
-    system = family_of(method, medium.dimension).system
-    assert system is not None, method
-    return system(medium, walls, method=method, **options)
+    family, method = family_of(method, medium)
+    assert family.system is not None, method
+    return family.system(medium, walls, method=method, **options)
 
 
 def remarks_on(method: str, result: EffectiveConductivity[Any]) -> tuple[str, ...]:
     """What a user should know about the accuracy of a result."""
-    return family_of(method, result.tensor.shape[0]).remarks(method, result)
+    family = FAMILIES.get((method, result.tensor.shape[0]), CONTACTS)
+    return family.remarks(method, result)
