@@ -18,8 +18,8 @@ SMALL = {
     "density_angle": (
         {
             r"density = \[.*?\]": "density = [0.6, 0.65, 0.7]",
-            "0.01:0.02": "0.03:0.05",
-            "realizations = 20": "realizations = 4",
+            "0.015:0.03": "0.03:0.05",
+            "realizations = 8": "realizations = 4",
         },
         r"0\.700    4 +0\.\d{4} +\d\.\d\d %",
     ),
