@@ -230,7 +230,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     """One realization; what it raises becomes its result."""
     started = time.time()
     try:
-        result = realize(spec, unit_rng(study.seed, unit))
+        result = realize(study.for_realization(spec, unit.realization), unit_rng(study.seed, unit))
     except Exception as error:
         result = failed_realization(error, spec)
     return Record(unit, result, rank, socket.gethostname(), started, time.time())
