@@ -200,12 +200,12 @@ def warn_of_sample(table: ParticleTable, driven: Sequence[int], gap: float = 0.0
 
 
 def warn_of_excess(tensor: ArrayLike, conductivity: ArrayLike) -> None:
-    """A sample conducts no better than its best particle; where it does, the box or the contacts are wrong."""
+    """A sample conducts no better than the best of its parts; where it does, the box or the contacts are wrong."""
     import numpy as np
 
     best, most = float(np.max(conductivity)), float(np.nanmax(np.diag(np.atleast_2d(tensor))))
     if most > best * (1.0 + 1e-9):
         warn(
-            f"the conductivity {most:.6g} W/(m K) exceeds that of the particles, {best:.6g}: walls or contacts go "
+            f"the conductivity {most:.6g} W/(m K) exceeds that of the best particle, {best:.6g}: walls or contacts go "
             "through particles, see --box and the contact rule"
         )

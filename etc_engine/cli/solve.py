@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from etc_engine.realization import Engine
 
 BOND_GAP = 1e-6
+ESTIMATED = 5_000
+"""Up to so many particles the discretization error is estimated where a method can; it takes three times as long."""
 LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fill_height": "fill height [m]"}
 
 
@@ -39,9 +41,15 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
 @particle_options
 @click.option("--axis", help="Load axis: x (the default), y, z or all.")
 @click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
-@click.option("--method", help="Of dtem: chord, standard, enhanced, arc or exact; of pipe: chord or uniform.")
+@click.option(
+    "--method",
+    help="Of dtem: chord, standard, enhanced, arc, exact; where the pores conduct cell (disks) or facets (spheres); "
+    "of pipe: chord or uniform.",
+)
 @click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
+@click.option("--degree", type=int, help="Polynomial degree on the edges of cells, with --method cell: 1 to 5.")
+@click.option("--bounds", is_flag=True, help="Rigorous bounds too, with --method cell and few disks.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
 )
@@ -109,11 +117,13 @@ def solve_command(
     record = _record(asked, method, result, field, axes)
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
-    _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
+    if not medium.pores.conduct:
+        _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
     gap = 0.0 if asked.contact_angle is None else asked.bond_gap
     if dumped.contacts is None:
         warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
-    warn_of_sample(table, [axis for axis in axes if not medium.box.periodic[axis]], gap)
+    driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
+    warn_of_sample(table, driven, gap)
     warn_of_excess(result.tensor, np.append(medium.conductivity, medium.pores.conductivity))
     _write(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
@@ -134,6 +144,8 @@ class _Asked:
     method: str | None
     pipe_resistance: str | None
     modes: int | None
+    degree: int | None
+    bounds: bool
     contact_angle: float | None
     bond_gap: float
     conductivity: float | None
@@ -189,7 +201,10 @@ class _Asked:
                 f"engine {engine.name} resolves the pores: use etc-engine homogenize FILE --engine {engine.name} "
                 "--matrix ... --inclusion ..."
             )
-        options = {} if self.modes is None else {"modes": self.modes}
+        given = {"modes": self.modes, "degree": self.degree, "bounds": self.bounds or None}
+        options = {name: value for name, value in given.items() if value is not None}
+        if "error_estimate" in engine.find_method(method).options and medium.packing.count <= ESTIMATED:
+            options["error_estimate"] = True
         return effective_conductivity(medium, engine=engine.name, method=method, axes=axes, **options)
 
 
@@ -317,7 +332,7 @@ def _record(
         **asked.physics.record,
         "contacts": int(np.count_nonzero(network.angles[:, 0])),
         "links": network.count,
-        "wall_contacts": len(network.walls_of(axis)),
+        "wall_contacts": int(np.count_nonzero(network.wall_angles[network.walls_of(axis)])),
         "unknowns": result.unknowns,
         "percolates": percolates,
         "status": int(status),

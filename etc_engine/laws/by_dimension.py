@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import InputError
-from etc_engine.laws import disk, sphere
+from etc_engine.laws import disk, sphere, sphere_dents
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,8 @@ class ResistanceLaw:
         What a contact is: ``arc`` or ``disk``.
     self_resistances : dict of callable
         By method, kappa R^(d-2) h_ii of half-angles.
+    pipe_resistances : dict of callable
+        The same and further ones, which have no mutual resistances.
     matrices : callable
         (offsets, arms, alpha, method, cutting) -> kappa R^(d-2) H of all particles, packed. ``cutting`` marks the
         contacts behind which the particle ends; all of them if it is None.
@@ -50,6 +52,7 @@ class ResistanceLaw:
     name: str
     contact: str
     self_resistances: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]]
+    pipe_resistances: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]]
     matrices: Callable[
         [NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], str, NDArray[np.bool_] | None],
         NDArray[np.float64],
@@ -66,6 +69,7 @@ LAWS: Mapping[int, ResistanceLaw] = {
         "disk",
         "arc",
         disk.SELF_RESISTANCE,
+        disk.SELF_RESISTANCE,
         disk.resistance_matrices,
         disk.first_moments,
         disk.segment_area,
@@ -77,9 +81,10 @@ LAWS: Mapping[int, ResistanceLaw] = {
         "sphere",
         "disk",
         sphere.SELF_RESISTANCE,
-        sphere.resistance_matrices,
+        sphere.PIPE_RESISTANCE,
+        sphere_dents.resistance_matrices,
         sphere.first_moments,
-        sphere.cap_volume,
+        sphere_dents.cap_volume,
         warming=1.0 / (20.0 * np.pi),
         harmonic=3.0 / (4.0 * np.pi),
         share=7.0 / 8.0,
@@ -133,7 +138,7 @@ def self_resistance(
         Of their particles.
     dimension : int
     method : str
-        A name of `ResistanceLaw.self_resistances`.
+        A name of `ResistanceLaw.pipe_resistances`.
 
     Raises
     ------
@@ -141,6 +146,6 @@ def self_resistance(
         If there is no such method.
     """
     law = law_of(dimension)
-    if method not in law.self_resistances:
-        raise InputError(f"a {law.name} has no method {method!r}: expected {', '.join(law.self_resistances)}")
-    return law.self_resistances[method](alpha) / length_scales(radii, dimension)
+    if method not in law.pipe_resistances:
+        raise InputError(f"a {law.name} has no method {method!r}: expected {', '.join(law.pipe_resistances)}")
+    return law.pipe_resistances[method](alpha) / length_scales(radii, dimension)

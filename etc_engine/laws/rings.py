@@ -197,11 +197,12 @@ def ring_edges(row: NDArray[np.float64], edges: NDArray[np.float64]) -> int:
             edges[k] = small * np.sin(first + (widest - first) * (k / RINGS) ** 3)
         return RINGS
     first = 0.25 * widest
-    if row[_FLUID] > 0.0:
+    if row[_FLUID] > 0.0:  # smooth in all of its arguments, as results shall be
         mean = 2.0 * row[_R1] * row[_R2] / (row[_R1] + row[_R2])
         gap = max(row[_DISTANCE] - row[_R1] - row[_R2], 0.0) + row[_JUMP]
         layer = 0.5 * row[_FLUID] * (1.0 / row[_K1] + 1.0 / row[_K2])
-        first = min(first, 0.3 * max(layer, np.sqrt(gap / mean)) * mean / small)
+        scale = 0.3 * np.sqrt(layer * layer + gap / mean) * mean / small
+        first = scale / (1.0 + (scale / first) ** 4) ** 0.25
     for k in range(RINGS + 1):
         edges[k] = small * np.sin(first * (widest / first) ** (k / RINGS))
     return RINGS

@@ -174,6 +174,44 @@ SELF_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
 }
 
 
+def holm_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+    """Resistance kappa R h = 1/(4 sin alpha) of an isothermal disk on a half-space (pipe method ``holm``).
+
+    Two of them in series conduct 2 kappa c, c = R sin alpha. The limit of `chord_resistance` for small contacts.
+
+    References
+    ----------
+    Batchelor, O'Brien 1977, Thermal or electrical conduction through a granular material, doi:10.1098/rspa.1977.0100.
+
+    Examples
+    --------
+    >>> bool(np.isclose(holm_resistance(1e-4), chord_resistance(1e-4), rtol=1e-3))
+    True
+    """
+    return np.asarray(0.25 / np.sin(np.asarray(alpha, dtype=np.float64)))
+
+
+def root_area_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+    """Resistance kappa R h = 1/(4 sqrt(pi) sin alpha) of the conductance 4 k_1 k_2/(k_1 + k_2) sqrt(A) of DEM codes.
+
+    A = pi c^2 is the area of the contact. It is there to reproduce such codes: it conducts sqrt(pi) = 1.77 times as
+    much as a small contact does.
+
+    References
+    ----------
+    LIGGGHTS, ``fix heat/gran/conduction``, source of the public version.
+    """
+    return np.asarray(holm_resistance(alpha) / np.sqrt(np.pi))
+
+
+PIPE_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
+    **SELF_RESISTANCE,
+    "holm": holm_resistance,
+    "root-area": root_area_resistance,
+}
+"""Self-resistances for which no mutual ones exist are for the pipe network alone."""
+
+
 def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
     """Self-resistance kappa R h_ii by the named method, ``chord`` or ``standard``.
 
@@ -228,61 +266,6 @@ def first_moments(arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDAr
     """First harmonic of an equilibrium disk, n (1 + 2 cos alpha)/3, shape (s, 3); of a cap nearly the same."""
     unit = arms / np.linalg.norm(arms, axis=1, keepdims=True)
     return np.asarray(unit * ((1.0 + 2.0 * np.cos(alpha)) / 3.0)[:, None])
-
-
-def cap_volume(alpha: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Volume behind a contact disk of half-angle alpha, pi (1 - cos alpha)^2 (2 + cos alpha)/3, of the unit sphere."""
-    return np.asarray(np.pi / 3.0 * (2.0 * np.sin(0.5 * alpha) ** 2) ** 2 * (2.0 + np.cos(alpha)))
-
-
-def resistance_matrices(
-    offsets: NDArray[np.int64],
-    arms: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    method: str,
-    cutting: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
-    """Resistance matrices kappa R H of many spheres, packed row by row one after the other.
-
-    Method ``chord`` adds the dents sum_j V_j g_jk . g_jl (R = 1): the caps that other contacts cut away carry no
-    heat. V_j = pi (1 - cos a_j)^2 (2 + cos a_j)/3 is the volume of a cap, g_jk the tangential gradient of N at
-    contact j by a source at contact k.
-
-    Parameters
-    ----------
-    offsets : ndarray of int, shape (n + 1,)
-        Contacts of sphere p: ``offsets[p]`` to ``offsets[p + 1]``.
-    arms : ndarray, shape (s, 3)
-        Directions of the contacts from the centre, of any length.
-    alpha : ndarray, shape (s,) [rad]
-        Half-angles; two contacts of a sphere must not meet.
-    method : str
-        ``chord`` or ``standard``.
-    cutting : ndarray of bool, shape (s,), optional
-        Contacts that dent the sphere; all by default.
-
-    Returns
-    -------
-    ndarray, shape (sum of squared contact numbers,)
-        Dimensionless.
-
-    Notes
-    -----
-    The dent term assumes the same tangential gradient on both sides of a contact, which holds exactly in lattices.
-    ``chord`` is then within .03 % of the conductivity of sc, bcc and fcc lattices up to 10 degrees and .2 % at 20.
-
-    Examples
-    --------
-    >>> h = resistance_matrices(np.array([0, 2]), np.array([[0, 0, 1.0], [0, 0, -1.0]]), np.array([0.1, 0.1]), "chord")
-    >>> h.reshape(2, 2).round(4).tolist()
-    [[2.5461, -0.1344], [-0.1344, 2.5461]]
-    """
-    own = self_resistance(alpha, method)
-    starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
-    normals = np.ascontiguousarray(arms / np.linalg.norm(arms, axis=1, keepdims=True))
-    volumes = np.where(method == "standard", 0.0, cap_volume(alpha))
-    volumes = volumes if cutting is None else np.where(cutting, volumes, 0.0)
-    return _matrices(offsets, starts, normals, np.ascontiguousarray(alpha), own, volumes, method == "standard")
 
 
 @njit(cache=True)
@@ -360,63 +343,3 @@ def _mutual(
     for k in range(cosine.size):
         out[k] = mutual_of_caps(cosine[k], a[k], b[k]) if uniform else mutual_of_disks(cosine[k], a[k], b[k])
     return out
-
-
-@njit(cache=True, error_model="numpy")
-def _matrices(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    own: NDArray[np.float64],
-    volumes: NDArray[np.float64],
-    uniform: bool,
-) -> NDArray[np.float64]:
-    """H_kl, and its dents sum_j V_j g_jk . g_jl for disks, of all spheres."""
-    values = np.empty(starts[-1])
-    widest = 0
-    for p in range(offsets.size - 1):
-        widest = max(widest, offsets[p + 1] - offsets[p])
-    gradient = np.empty((widest, 3))
-    for p in range(offsets.size - 1):
-        o, s, n = offsets[p], starts[p], offsets[p + 1] - offsets[p]
-        for i in range(n):
-            values[s + i * n + i] = own[o + i]
-            for j in range(i):
-                cosine = 0.0
-                for axis in range(3):
-                    cosine += normals[o + i, axis] * normals[o + j, axis]
-                a, b = alpha[o + i], alpha[o + j]
-                h = mutual_of_caps(cosine, a, b) if uniform else mutual_of_disks(cosine, a, b)
-                values[s + i * n + j] = h
-                values[s + j * n + i] = h
-        for j in range(n):
-            if volumes[o + j] > 0.0:
-                _add_dent(values[s : s + n * n], normals[o : o + n], j, volumes[o + j], gradient)
-    return values
-
-
-@njit(cache=True, error_model="numpy")
-def _add_dent(
-    h: NDArray[np.float64], normals: NDArray[np.float64], j: int, volume: float, gradient: NDArray[np.float64]
-) -> None:
-    """H_kl += V_j g_jk . g_jl with g_jk = N'(cos gamma_jk) (n_k - cos gamma_jk n_j), g_jj = 0.
-
-    4 pi N' = [1/s^3 + (1 + 2s)/(s^2 (1 + s))]/4, s = sin(gamma/2).
-    """
-    n = len(normals)
-    for k in range(n):
-        cosine = 0.0
-        for axis in range(3):
-            cosine += normals[j, axis] * normals[k, axis]
-        square = 0.5 * (1.0 - cosine)
-        s = math.sqrt(max(square, 0.0))
-        slope = 0.0 if k == j else (1.0 / (s * square) + (1.0 + 2.0 * s) / (square * (1.0 + s))) / (4.0 * FOUR_PI)
-        for axis in range(3):
-            gradient[k, axis] = slope * (normals[k, axis] - cosine * normals[j, axis])
-    for k in range(n):
-        for m in range(n):
-            dot = 0.0
-            for axis in range(3):
-                dot += gradient[k, axis] * gradient[m, axis]
-            h[k * n + m] += volume * dot

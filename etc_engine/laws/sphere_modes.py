@@ -164,6 +164,8 @@ def pair_means(
     row = 0 if ratio < 0.15 else 1 if ratio < 0.4 else 2 if ratio < 0.75 else 3
     first, m = _FIRST[row], 4 << row
     n = np.empty(2 * top + 1, dtype=np.complex128)
+    powers_z, powers_t = np.ones(top + 1, dtype=np.complex128), np.ones(top + 1, dtype=np.complex128)
+    at = np.empty((top + 1, top + 1, top + 1))  # zeta'^(p-r) zeta^(q-r) N^(p+q-r) at one pair of points
     ca, sa, cb, sb = math.cos(a), math.sin(a), math.cos(b), math.sin(b)
     out[:] = 0.0
     for x in range(m):
@@ -171,12 +173,18 @@ def pair_means(
         for y in range(m // 2):  # (y, y') and (-y, -y') are conjugate
             t = complex(cb, sb * _RULE[0, first + y])
             neumann_derivatives(z * z, t * t, z * t * cosine, n)
+            for k in range(top):
+                powers_z[k + 1], powers_t[k + 1] = powers_z[k] * z, powers_t[k] * t
+            for p in range(top + 1):
+                for q in range(top + 1):
+                    for r in range(min(p, q) + 1):
+                        at[p, q, r] = (powers_t[p - r] * powers_z[q - r] * n[p + q - r]).real
             for f in range(orders.size):
                 for g in range(orders.size):
                     p, q = orders[f], orders[g]
                     weight = 2.0 * lines[f, first + x] * lines[g, first + y]
                     for r in range(min(p, q) + 1):
-                        out[f, g, r] += weight * (t ** (p - r) * z ** (q - r) * n[p + q - r]).real
+                        out[f, g, r] += weight * at[p, q, r]
     for f in range(orders.size):
         for g in range(orders.size):
             out[f, g] *= sa ** orders[f] * sb ** orders[g]

@@ -113,6 +113,7 @@ def facet_links(network: ContactNetwork) -> FacetLinks:
     ----------
     network : ContactNetwork
         Three-dimensional; its contacts become contact disks of radius R sin(alpha), the smaller of the two sides'.
+        `no_contacts` gives one without any.
 
     Returns
     -------
@@ -168,6 +169,33 @@ def facet_links(network: ContactNetwork) -> FacetLinks:
         np.concatenate(contacts),
         np.concatenate(bonds),
         facets.volumes,
+    )
+
+
+def no_contacts(packing: ParticlePacking) -> ContactNetwork:
+    """A network without links."""
+    none, pairs = np.zeros(0, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
+    shifts = np.zeros((0, packing.dimension), dtype=np.int64)
+    empty = np.zeros(0)
+    return ContactNetwork(packing, pairs, shifts, np.zeros((0, 2)), empty, none, none, empty, empty, "none")
+
+
+def links_network(links: FacetLinks, rule: str) -> ContactNetwork:
+    """All facets as links of a network: half-angle 0 where they hold no contact."""
+    m, radii = links.count, links.packing.radii
+    angles = np.arcsin(np.minimum(links.contacts[:m, None] / radii[links.pairs], 1.0))
+    at_walls = np.arcsin(np.minimum(links.contacts[m:] / radii[links.wall_particles], 1.0))
+    return ContactNetwork(
+        links.packing,
+        links.pairs,
+        links.shifts,
+        angles,
+        links.bonds[:m],
+        links.wall_particles,
+        links.walls,
+        at_walls,
+        links.bonds[m:],
+        rule,
     )
 
 

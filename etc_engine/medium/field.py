@@ -44,6 +44,9 @@ class ParticleField:
         Flux modes into the particle at each side; mode 0 is the heat flow.
     inside : callable, optional
         Temperature at points inside particles, of engines that know it.
+    reach : ndarray, shape (n,), optional [m]
+        Distance from each centre up to which ``inside`` knows the temperature of the pores too; a point belongs to the
+        particle of least power |x - x_i|^2 - R_i^2.
     """
 
     medium: Medium
@@ -57,3 +60,4 @@ class ParticleField:
     face_temperatures: NDArray[np.float64]
     flow_modes: NDArray[np.float64]
     inside: Inside | None = None
+    reach: NDArray[np.float64] | None = None

@@ -22,7 +22,8 @@ def sample_image(field: ParticleField, pixels: int = 600) -> tuple[NDArray[np.fl
     Returns
     -------
     temperatures : ndarray, shape (ny, nx) [K]
-        At pixel centres, first row at the bottom; NaN outside the particles.
+        At pixel centres, first row at the bottom; NaN where it is not known: outside the particles, unless the field
+        reaches into the pores.
     owners : ndarray of int, shape (ny, nx)
         Particle of each pixel, -1 outside. Where disks overlap their common chord separates them.
     """
@@ -30,7 +31,9 @@ def sample_image(field: ParticleField, pixels: int = 600) -> tuple[NDArray[np.fl
     packing = field.medium.packing
     lengths = np.asarray(packing.box.lengths)
     nx, ny = (max(round(float(pixels * length / lengths.max())), 1) for length in lengths)
-    owners, offsets = _owners(packing.centers, packing.radii, lengths, np.asarray(packing.box.periodic), nx, ny)
+    reach = packing.radii if field.reach is None else field.reach
+    shape = (nx, ny, np.inf if field.reach is not None else 0.0)
+    owners, offsets = _owners(packing.centers, packing.radii, reach, lengths, np.asarray(packing.box.periodic), *shape)
     rows, columns = np.nonzero(owners >= 0)
     temperatures = np.full(owners.shape, np.nan)
     particles = owners[rows, columns]
@@ -47,24 +50,26 @@ def sample_image(field: ParticleField, pixels: int = 600) -> tuple[NDArray[np.fl
 def _owners(
     centers: NDArray[np.float64],
     radii: NDArray[np.float64],
+    reach: NDArray[np.float64],
     lengths: NDArray[np.float64],
     periodic: NDArray[np.bool_],
     nx: int,
     ny: int,
+    farthest: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Owner of each pixel by the smallest power distance, and the pixel's place relative to the owner's centre."""
+    """Owner of each pixel by the smallest power below ``farthest``, and the pixel's place relative to its centre."""
     owners = np.full((ny, nx), -1, dtype=np.int64)
     offsets = np.zeros((ny, nx, 2))
-    best = np.zeros((ny, nx))
+    best = np.full((ny, nx), farthest)
     dx, dy = lengths[0] / nx, lengths[1] / ny
     for p in range(radii.size):
-        r = radii[p]
+        r, far = radii[p], reach[p]
         reach_x, reach_y = (1 if periodic[0] else 0), (1 if periodic[1] else 0)
         for sx in range(-reach_x, reach_x + 1):
             for sy in range(-reach_y, reach_y + 1):
                 x, y = centers[p, 0] + sx * lengths[0], centers[p, 1] + sy * lengths[1]
-                for row in range(max(int((y - r) / dy), 0), min(int((y + r) / dy) + 1, ny)):
-                    for column in range(max(int((x - r) / dx), 0), min(int((x + r) / dx) + 1, nx)):
+                for row in range(max(int((y - far) / dy), 0), min(int((y + far) / dy) + 1, ny)):
+                    for column in range(max(int((x - far) / dx), 0), min(int((x + far) / dx) + 1, nx)):
                         u, v = (column + 0.5) * dx - x, (row + 0.5) * dy - y
                         power = u * u + v * v - r * r
                         if power < best[row, column]:

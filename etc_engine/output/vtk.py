@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from etc_engine.errors import InputError, OutputError
 from etc_engine.medium.field import ParticleField
+from etc_engine.output.sphere_vtk import write_sphere_vtp
 
 RINGS, SPOKES = 6, 36
 """A disk is drawn as this many rings of quadrilaterals, finer towards its boundary, around a fan."""
@@ -26,14 +27,12 @@ def write_vtp(path: Path, field: ParticleField) -> None:
     Raises
     ------
     InputError
-        If the name does not end in ``.vtp``, the particles are no disks, or the library ``vtk`` is missing.
+        If the name does not end in ``.vtp`` or the library ``vtk`` is missing.
     OutputError
         If the file cannot be written.
     """
     if path.suffix != ".vtp":
         raise InputError(f"VTK PolyData is written to a .vtp file, found {path.name!r}")
-    if field.medium.dimension != 2:
-        raise InputError("VTK PolyData of a solve draws disks, the particles are spheres: write a netCDF file with -o")
     try:
         from vtkmodules.util.numpy_support import numpy_to_vtk
         from vtkmodules.vtkCommonCore import vtkPoints
@@ -43,6 +42,9 @@ def write_vtp(path: Path, field: ParticleField) -> None:
         raise InputError(
             "writing VTK files needs the library vtk: install the extra with pip install 'etc-engine[vtk]'"
         ) from None
+    if field.medium.dimension == 3:
+        write_sphere_vtp(path, field)
+        return
     points, temperature, polygons, owner = _disks(field)
     lines, flow = _contacts(field)
     ends = np.concatenate([points, lines.reshape(-1, 2)])

@@ -15,8 +15,13 @@ from etc_engine.packing.radii import RadiusDistribution
 RETRIES = 4
 """How often an edge too wide for the radius at hand waits for another radius."""
 
-WALL_DEPTH = 0.5
-"""A disk that would cross a wall by less than this times its radius waits; by more, it goes to the wall."""
+WALL_DEPTH = 0.8
+"""A disk that would cross a wall by less than this times its radius waits; by more, it goes to the wall.
+
+With edges at walls waiting, 0.8 gives the published coordination: 3.86 of 3.88 in 1073 disks, 0.5 gives 3.84."""
+
+CORNERS = np.array([[0, 2], [2, 1], [1, 3], [3, 0]])
+"""The pairs of walls that meet, each in the order of an edge of the front."""
 
 OVERLAP = 1e-12
 """Relative overlap that counts as tangency: rounding of the tangent positions stays below it."""
@@ -32,7 +37,7 @@ def pack_advancing_front(radii: RadiusDistribution, box: Box, rng: np.random.Gen
     box : Box
         Two-dimensional box with walls on all sides.
     rng : numpy.random.Generator
-        Source of the radii and of the direction of the first pair.
+        Source of the radii and of the corner where the front starts.
 
     Returns
     -------
@@ -48,12 +53,17 @@ def pack_advancing_front(radii: RadiusDistribution, box: Box, rng: np.random.Gen
 
     Notes
     -----
-    The front grows outwards from two tangent disks in the middle of the box. An oriented edge (a, b) of the
-    front has its free side on the left; the next radius is tried tangent to a and b there. If it hits an
-    object c, the edges (a, c) and (c, b) are tried with the same radius; otherwise the disk is placed and
-    brings two new edges. Walls take part as objects. A radius is kept until it has found a place, so the
-    sizes are an unbiased sample of the distribution. Each step places a disk or uses up an edge, and a disk
-    has a bounded number of edges: the cost is linear in the number of disks.
+    The front grows out of a corner drawn at random. An oriented edge (a, b) of the front has its free side on the
+    left; the next radius is tried tangent to a and b there. If it hits an object c, the edges (a, c) and (c, b) are
+    tried with the same radius; otherwise the disk is placed and brings two new edges. Walls take part as objects. A
+    radius is kept until it has found a place, so the sizes are an unbiased sample of the distribution. Each step
+    places a disk or uses up an edge, and a disk has a bounded number of edges: the cost is linear in the number of
+    disks.
+
+    A young front packs more densely than an old one: its covered fraction falls from 0.85 to 0.82 over the first
+    five disks and approaches 0.81 slowly. A front that starts in the middle of the box shows that as a dense centre of
+    smaller disks; out of a corner its first disks stand where the wall disturbs the packing anyway. More than five
+    mean diameters from a wall the covered fraction is uniform within 1 %, over square shells about the centre.
 
     Every disk has exactly two tangencies when it is placed, so that the mean coordination is 4 - 2 w / N
     with w wall tangencies. The area fraction is about 0.8 for sizes uniform within a factor of two.
@@ -148,11 +158,10 @@ def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) ->
     if 2.0 * sizes.max() > min(box.lengths):
         raise InputError(f"a disk of radius {sizes.max():g} is wider than the box {box.lengths}: use smaller radii")
     grids = cell_grids(sizes, box)
-    direction = rng.uniform(0.0, 2.0 * np.pi)
-    from_the_middle = sizes.size > 1 and 4.0 * (sizes[0] + sizes[1]) < min(box.lengths)
-    centers: NDArray[np.float64] = _fill(sizes, grids, direction, from_the_middle, RETRIES, WALL_DEPTH)
-    if from_the_middle and not _touches_all_walls(centers, sizes, box):
-        centers = _fill(sizes, grids, direction, False, RETRIES, WALL_DEPTH)
+    corner = int(rng.integers(4))
+    centers: NDArray[np.float64] = _fill(sizes, grids, CORNERS[corner : corner + 1], RETRIES, WALL_DEPTH)
+    if not _touches_all_walls(centers, sizes, box):  # a small box: start at every wall
+        centers = _fill(sizes, grids, CORNERS, RETRIES, WALL_DEPTH)
     if not _touches_all_walls(centers, sizes, box):
         raise PackingError(f"the box {box.lengths} is too small for these radii: not every wall could be touched")
     return centers
@@ -289,7 +298,7 @@ def _append(queue, end, a, b, tries):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # type: ignore[no-untyped-def]  # noqa: PLR0915
+def _fill(sizes, grids, corners, retries, wall_depth):  # type: ignore[no-untyped-def]  # noqa: PLR0915
     """Place disks of the given sizes, in their order, until no edge of the front takes the next one.
 
     Edges wait in three places: `pending` (last in, first out) holds the edges to be tried at once with the
@@ -307,20 +316,9 @@ def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # typ
     hits = np.empty(64, dtype=np.int64)
     seen = {np.int64(-1)}  # edges made by hits, each tried once
 
-    if from_the_middle:
-        reach = sizes[0] + sizes[1]
-        x[0], y[0] = 0.5 * lx, 0.5 * ly
-        x[1], y[1] = x[0] + reach * np.cos(direction), y[0] + reach * np.sin(direction)
-        for i in range(2):
-            cell = cell_of(x[i], y[i], 0.0, grids.level[i], grids.cells, grids.first_cell, grids.lengths)
-            following[i], heads[cell] = heads[cell], i
-            front = _append(front, front_end, i, 1 - i, 0)
-            front_end += 1
-        placed = 2
-    else:
-        for wall_a, wall_b in ((0, 2), (2, 1), (1, 3), (3, 0)):
-            front = _append(front, front_end, n + wall_a, n + wall_b, 0)
-            front_end += 1
+    for corner in range(len(corners)):
+        front = _append(front, front_end, n + corners[corner, 0], n + corners[corner, 1], 0)
+        front_end += 1
 
     while placed < n:
         if pending_end > 0:
@@ -361,8 +359,12 @@ def _fill(sizes, grids, direction, from_the_middle, retries, wall_depth):  # typ
         cell = cell_of(cx, cy, 0.0, grids.level[placed], grids.cells, grids.first_cell, grids.lengths)
         following[placed], heads[cell] = heads[cell], placed
         for p, q in ((a, placed), (placed, b)):
-            front = _append(front, front_end, p, q, 0)
-            front_end += 1
+            if p >= n or q >= n:
+                wall_front = _append(wall_front, wall_end, p, q, 0)
+                wall_end += 1
+            else:
+                front = _append(front, front_end, p, q, 0)
+                front_end += 1
         placed += 1
     centers = np.empty((placed, 2))
     centers[:, 0], centers[:, 1] = x[:placed], y[:placed]

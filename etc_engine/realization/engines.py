@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from etc_engine.box import AXES
-from etc_engine.engines.dtem import conductivity as dtem
-from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem import families as dtem
 from etc_engine.engines.dtem.methods import dimensions_of
-from etc_engine.engines.dtem.transient import element_system
 from etc_engine.engines.lattice import homogenize as lattice
 from etc_engine.engines.pipe import steady as pipe
 from etc_engine.engines.pipe.field import pipe_field
@@ -25,7 +23,20 @@ from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.transient import ParticleSystem
-from etc_engine.realization.options import ANGLE_CURVE, BOUNDARY, DIPOLES, GREEN, MODES, Option, whole_number, word_of
+from etc_engine.realization.options import (
+    ANGLE_CURVE,
+    BOUNDARY,
+    BOUNDS,
+    DEGREE,
+    DIPOLES,
+    ERROR_ESTIMATE,
+    GREEN,
+    MATERIAL_CURVE,
+    MODES,
+    Option,
+    whole_number,
+    word_of,
+)
 from etc_engine.realization.outcome import Outcome, outcome_of
 
 NO, MAY, MUST = "no", "may", "must"
@@ -108,8 +119,8 @@ class Engine:
 
     @property
     def needs_contacts(self) -> bool:
-        """Whether its methods work on a contact network; otherwise they resolve the pores."""
-        return all(method.contacts for method in self.methods.values())
+        """Whether its methods heed a contact network; otherwise they resolve the pores alone."""
+        return any(method.contacts for method in self.methods.values())
 
     def default_method(self, dimension: int, pores_conduct: bool) -> str:
         """The first method that works in a dimension and with pores that conduct or do not.
@@ -270,12 +281,36 @@ ENGINES: Mapping[str, Engine] = {
                     dimensions_of("exact"),
                     options=("modes",),
                 ),
+                "cell": Method(
+                    "Laguerre cells: disks and the fluid between them",
+                    (2,),
+                    pores=MUST,
+                    transient=True,
+                    options=("degree", "error_estimate", "bounds"),
+                ),
+                "facets": Method(
+                    "facet links: spheres and the fluid between them, one link per Laguerre facet",
+                    (3,),
+                    contacts=False,
+                    pores=MUST,
+                    transient=True,
+                    options=("dipoles", "material_curve"),
+                    gas=True,
+                ),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
-            {"modes": MODES, "angle_curve": ANGLE_CURVE, "dipoles": DIPOLES},
-            system=element_system,
-            recover=lambda _, __, solution, load: recover_field(solution, load),
-            remarks=dtem.accuracy_remarks,
+            {
+                "modes": MODES,
+                "angle_curve": ANGLE_CURVE,
+                "dipoles": DIPOLES,
+                "material_curve": MATERIAL_CURVE,
+                "degree": DEGREE,
+                "error_estimate": ERROR_ESTIMATE,
+                "bounds": BOUNDS,
+            },
+            system=dtem.system_of,
+            recover=dtem.field_of,
+            remarks=dtem.remarks_on,
         ),
         Engine(
             "pipe",
@@ -283,6 +318,8 @@ ENGINES: Mapping[str, Engine] = {
             {
                 "chord": Method("resistance of a contact chord", (2, 3), transient=True),
                 "uniform": Method("resistance under uniform flux (Feng et al. 2009)", (2, 3), transient=True),
+                "holm": Method("2 kappa c, for small contacts of radius c", (3,), transient=True),
+                "root-area": Method("2 kappa sqrt(A), as in some DEM codes: 1.77 times too much", (3,), transient=True),
             },
             lambda media, conduction, _: pipe.solve_series(media, conduction),
             system=pipe_system,

@@ -74,6 +74,14 @@ MODES = Option("flux modes of a contact", None, whole_number(1, 10))
 ANGLE_CURVE = Option(
     "reduced: many half-angles of one packing together, full: each alone", "reduced", word_of("reduced", "full")
 )
+MATERIAL_CURVE = Option(
+    "reduced: many temperatures, pressures and conductivities of one packing together, full: each alone",
+    "reduced",
+    word_of("reduced", "full"),
+)
 DIPOLES = Option("dipole states in a transient, for earlier times", False, _truth)
 BOUNDARY = Option("periodic or walls; as the box by default", None, word_of("periodic", "walls"))
 GREEN = Option("Green operator", "rotated", word_of("rotated", "continuous"))
+DEGREE = Option("polynomial degree of the temperature on the edges of cells", 3, whole_number(1, 5))
+ERROR_ESTIMATE = Option("whether the discretization error is estimated, by two finer computations", False, _truth)
+BOUNDS = Option("whether rigorous bounds are computed, by a conforming mesh of few disks", False, _truth)

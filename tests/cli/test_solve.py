@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from etc_engine.cli import run
 
 TABLE_2 = Path(__file__).parents[1] / "published" / "data" / "feng2008_table2_particles.csv"
 
@@ -165,3 +168,24 @@ def test_numbers_beyond_all_measure_are_refused(etc_engine, tmp_path, rows, opti
     assert done.returncode == 2
     assert words in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_pores_that_conduct_are_solved_by_cells(feng_particles, tmp_path, capsys):
+    rows = np.column_stack((feng_particles.centers, feng_particles.radii))
+    path, picture, data = tmp_path / "twelve.csv", tmp_path / "field.png", tmp_path / "field.nc"
+    np.savetxt(path, rows, delimiter=",", header="x,y,radius", comments="", fmt="%.17g")
+    words = ["solve", str(path), "--box", "1,1", "--pore-conductivity", "0.01"]
+    assert run([*words, "--json", "--bounds", "--plot", str(picture), "-o", str(data)]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["method"] == "cell"
+    assert record["pore_conductivity"] == 0.01
+    assert abs(record["conductivity"] / 0.3104213 - 1.0) < 0.004  # own two-sided bounds
+    assert record["conductivity_bounds"][0] < 0.3104213 < record["conductivity_bounds"][1]
+    assert 0.0 < record["model_error_estimate"] < 0.008
+    assert (record["contacts"], record["wall_contacts"]) == (17, 4)
+    assert record["links"] > record["contacts"]
+    assert picture.stat().st_size > 10_000
+    assert run([*words, "--degree", "7"]) == 2
+    assert "a whole number from 1 to 5" in capsys.readouterr().err
+    assert run(["solve", str(path), "--box", "1,1", "--pore-conductivity", "-1"]) == 2
+    assert "must be finite and not negative" in capsys.readouterr().err

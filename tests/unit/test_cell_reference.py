@@ -128,7 +128,7 @@ def test_published_particles_between_walls(feng_particles):
         assert np.abs(found / true - 1.0).max() < CALIBRATED_ERROR
     model = build_model(geometry, np.ones(12), 0.01)
     solution = solve_model(model, (0,))
-    heat_in, heat_out = solution.wall_heat_flows()
+    heat_in, heat_out = solution.wall_heat()
     assert heat_in == pytest.approx(heat_out, rel=1e-9)
     assert heat_in == pytest.approx(solution.energies[0, 0], rel=1e-9)
     u = solution.fluctuations[:, 0]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 from scipy.stats import kstest
 
 from etc_engine.box import Box, parse_periodic
@@ -72,6 +73,47 @@ def test_each_half_of_the_box_is_equally_dense():
     for axis in (0, 1):
         lower = packing.measures[packing.centers[:, axis] < 0.5].sum() / packing.measures.sum()
         assert abs(lower - 0.5) < 0.01
+
+
+@pytest.fixture(scope="module")
+def ensemble():
+    """25 packings of some 2400 disks, the box 50 mean diameters wide."""
+    radii = parse_radii("uniform:0.01:0.02")
+    return [pack_advancing_front(radii, Box((1.5, 1.5)), np.random.default_rng(6100 + k)) for k in range(25)]
+
+
+def shell_of(points, width, shells=10):
+    """Square shells about the centre, from the inside to the walls."""
+    return np.minimum((np.abs(points / width - 0.5).max(axis=1) * 2.0 * shells).astype(int), shells - 1)
+
+
+def test_the_bulk_is_homogeneous(ensemble):
+    """Shells more than five mean diameters from a wall; out of the middle of the box the centre was 5 % denser."""
+    side = (np.arange(300) + 0.5) / 300 * 1.5
+    points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    shells = shell_of(points, 1.5)
+    covered = np.zeros(10)
+    for packing in ensemble:
+        distances, nearest = cKDTree(packing.centers).query(points, k=4)
+        covered += np.bincount(shells, (distances < packing.radii[nearest]).any(axis=1), minlength=10)
+    bulk = covered[:8] / np.bincount(shells, minlength=10)[:8] / len(ensemble)
+    assert np.abs(bulk / bulk.mean() - 1.0).max() < 0.01
+
+
+def test_the_centre_has_the_radii_of_the_distribution(ensemble):
+    inner = np.concatenate([p.radii[shell_of(p.centers, 1.5) < 3] for p in ensemble])
+    assert abs(inner.mean() / 0.015 - 1.0) < 3.0 * inner.std() / 0.015 / np.sqrt(inner.size)
+
+
+def test_the_contacts_are_isotropic(ensemble):
+    """Fabric of the bulk, sum of n n over contacts: its two diagonal values agree within 2 %."""
+    squares = np.zeros(2)
+    for packing in ensemble:
+        pairs = neighbor_pairs(packing, relative_gap=1e-6).pairs
+        inside = (shell_of(packing.centers, 1.5) < 8)[pairs].all(axis=1)
+        branches = packing.centers[pairs[inside, 1]] - packing.centers[pairs[inside, 0]]
+        squares += ((branches / np.linalg.norm(branches, axis=1, keepdims=True)) ** 2).sum(axis=0)
+    assert squares[0] / squares[1] == pytest.approx(1.0, abs=0.02)
 
 
 def test_few_disks_in_a_small_box_touch_all_walls():

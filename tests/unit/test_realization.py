@@ -16,7 +16,9 @@ from etc_engine.realization.media import make_media
 
 VALUES = {"bond_gap": 1e-6, "contact_resistance": 0.0, "particle_conductivity": 1.0, "pore_conductivity": 0.0}
 SPEC = RealizationSpec(
-    PackingSpec("advancing-front", parse_radii("uniform:0.02:0.04"), Box((1.0, 1.0)), density=0.7, radius_growth=False),
+    PackingSpec(
+        "advancing-front", parse_radii("uniform:0.02:0.04"), Box((1.0, 1.0)), density=0.75, radius_growth=False
+    ),
     "bonded",
     (Conduction("dtem", "chord"), Conduction("dtem", "standard")),
     VALUES,
@@ -47,7 +49,7 @@ def test_cells_are_ordered_by_angle_and_method():
     assert (k[1] > k[0]).all()  # wider arcs
     assert (k[:, 0] > k[:, 1]).all()  # chord above standard
     assert statuses(cells) == {Status.OK}
-    assert result.density == pytest.approx(0.7, abs=0.005)
+    assert result.density == pytest.approx(0.75, abs=0.005)
     assert result.solid_fraction == pytest.approx(result.density, abs=1e-6)
 
 

@@ -17,10 +17,10 @@ from etc_engine.laws.sphere import (
     disk_resistance,
     mutual_resistance,
     neumann,
-    resistance_matrices,
     self_resistance,
     standard_resistance,
 )
+from etc_engine.laws.sphere_dents import resistance_matrices
 from etc_engine.laws.sphere_field import sphere_temperatures
 
 SPECIFICATION = importlib.util.spec_from_file_location("cut_sphere", Path(__file__).with_name("cut_sphere.py"))

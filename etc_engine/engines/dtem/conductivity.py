@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.angle_curve import solve_angle_curve
 from etc_engine.engines.dtem.exact.bounds import energy_bounds
+from etc_engine.engines.dtem.exact.spheres import DEGREE
 from etc_engine.engines.dtem.model_error import chord_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution, solve_steady
 from etc_engine.medium.backbone import Backbone, find_backbones
@@ -49,8 +50,8 @@ def element_conductivity(
     Returns
     -------
     EffectiveConductivity
-        0 along an axis that no path of contacts spans. ``model_error`` is estimated for ``chord``, and is the distance
-        of the two ``bounds`` for ``exact``.
+        0 along an axis that no path of contacts spans. ``model_error`` is estimated for ``chord``. For ``exact`` it is
+        the distance of the two ``bounds`` of disks, and what the last degree of flux modes has changed for spheres.
 
     Raises
     ------
@@ -73,14 +74,34 @@ def element_conductivity(
         return solve_steady(medium, group, method=method, tolerance=tolerance, modes=modes, backbone=backbones[group])
 
     result = effective_tensor(medium.box, axes, solve)
-    if method == "chord" and medium.dimension == 2:
+    if method == "chord":
         estimates = [chord_error_estimate(s, load) for s in result.solutions for load in range(len(s.axes))]
         return replace(result, model_error=max(estimates))
-    if method != "exact" or medium.dimension != 2:
+    if method != "exact":
         return result
+    if medium.dimension == 3:
+        return replace(result, model_error=_fewer_modes(result, medium, modes or DEGREE + 1, tolerance, backbones))
     bounds = conductivity_bounds(result)
     apart = [upper / lower - 1.0 for lower, upper in bounds if lower > 0.0]
     return replace(result, bounds=bounds, model_error=float(max(apart, default=0.0)))
+
+
+def _fewer_modes(
+    result: EffectiveConductivity[SteadySolution], medium: Medium, modes: int, tolerance: float, backbones: Backbones
+) -> float:
+    """Estimated relative error of ``exact`` for spheres: what the flux modes of the highest degree have changed."""
+    if modes == 1:
+        return float("nan")
+    axes = tuple(axis for solution in result.solutions for axis in solution.axes)
+
+    def solve(group: tuple[int, ...]) -> SteadySolution:
+        return solve_steady(
+            medium, group, method="exact", tolerance=tolerance, modes=modes - 1, backbone=backbones[group]
+        )
+
+    fewer = effective_tensor(medium.box, axes, solve).tensor
+    before, after = np.diag(fewer)[list(axes)], np.diag(result.tensor)[list(axes)]
+    return float(np.abs(before[after > 0.0] / after[after > 0.0] - 1.0).max(initial=0.0))
 
 
 def conductivity_bounds(result: EffectiveConductivity[SteadySolution]) -> NDArray[np.float64]:
@@ -188,7 +209,7 @@ def accuracy_remarks(method: str, result: EffectiveConductivity[SteadySolution])
     if not close:
         return ()
     return (
-        f"between {close} pairs of contact arcs of one particle the gap is less than the sum of their half-angles; "
+        f"between {close} pairs of contacts of one particle the gap is less than the sum of their half-angles; "
         f"{method} loses accuracy there, method exact does not",
     )
 

@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.element import Elements, condense, packed_starts
+from etc_engine.engines.dtem.element import Elements, Resistances, condense, packed_starts
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.rings import FacingSpheres, condense_pairs, legendre_means
 from etc_engine.medium.facets import FacetLinks
@@ -186,10 +186,8 @@ def facing_spheres(links: FacetLinks, material: FacetMaterial, rows: NDArray[np.
     )
 
 
-def facet_resistances(
-    links: FacetLinks, material: FacetMaterial, sides: FacetSides
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Resistance matrices H of all spheres [K/W], packed as (starts, values).
+def facet_resistances(links: FacetLinks, material: FacetMaterial, sides: FacetSides) -> Resistances:
+    """Resistance matrices H of all spheres [K/W], half of the fluid's R_gap included; moments are a_1 n.
 
     Raises
     ------
@@ -210,7 +208,7 @@ def facet_resistances(
     share = np.where(of_tubes < links.count, 0.5, 1.0)
     added[tubes] = share * links.lengths[of_tubes] / (material.open_fluid[of_tubes] * sides.columns[tubes])
     starts = packed_starts(sides.offsets)
-    values = np.zeros(int(starts[-1]))
+    values, moments = np.zeros(int(starts[-1])), np.empty((sides.nodes.size, 3))
     l = np.arange(1, TERMS + 1)
     kappa, radii = material.conductivity[sides.spheres], links.packing.radii[sides.spheres]
     pores = material.open_fluid[sides.links[sides.nodes]]
@@ -225,16 +223,17 @@ def facet_resistances(
         factor[:, None, None] * uneven,
         (2 * l + 1) / l * np.sinc(l / (TERMS + 1)),
         starts,
-        values,
+        (values, moments),
     )
-    return starts, values
+    return Resistances(1, starts, values, moments)
 
 
 @njit(cache=True)
-def _fill(sides, rows, condensed, scales, repair, weights, starts, values):  # type: ignore[no-untyped-def]
+def _fill(sides, rows, condensed, scales, repair, weights, starts, out):  # type: ignore[no-untyped-def]
     """H_ij = scale [sum_l weight_l a_l^i a_l^j P_l(n_i.n_j) + 3 a_1^i a_1^j n_i.repair n_j], H_ii from the rings."""
     offsets, pairs, ends, normals, added = sides
     shapes, constrictions = condensed
+    values, moments = out
     terms = weights.size
     widest = 1
     for p in range(offsets.size - 1):
@@ -273,6 +272,8 @@ def _fill(sides, rows, condensed, scales, repair, weights, starts, values):  # t
         q = 0
         for i in range(n):
             a = first + i
+            for x in range(3):
+                moments[a, x] = by_term[0, i] * normals[a, x]
             for j in range(i + 1):
                 b = first + j
                 mend = 0.0
@@ -291,7 +292,7 @@ def _fill(sides, rows, condensed, scales, repair, weights, starts, values):  # t
                 values[starts[p] + j * n + i] = mend
 
 
-def facet_elements(sides: FacetSides, starts: NDArray[np.int64], resistances: NDArray[np.float64]) -> Elements:
+def facet_elements(sides: FacetSides, h: Resistances) -> Elements:
     """Conductivity matrices K_e = P (P^T H P)^-1 P^T of all spheres.
 
     Raises
@@ -299,14 +300,14 @@ def facet_elements(sides: FacetSides, starts: NDArray[np.int64], resistances: ND
     GeometryError
         If the resistance matrix of a sphere is not positive definite.
     """
-    values = np.zeros_like(resistances)
-    bad = _invert(sides.offsets, starts, resistances, values)
+    values = np.zeros_like(h.values)
+    bad = _invert(sides.offsets, h.starts, h.values, values)
     if bad >= 0:
         raise GeometryError(
             f"the resistance matrix of sphere {bad} with {sides.offsets[bad + 1] - sides.offsets[bad]} facets is not "
             f"positive definite: its contact disks are too wide or too close for facet links; use smaller contacts"
         )
-    return Elements(1, sides.offsets, sides.nodes, starts, values)
+    return Elements(1, sides.offsets, sides.nodes, h.starts, values)
 
 
 @njit(cache=True)

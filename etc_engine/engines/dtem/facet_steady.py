@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.engines.dtem.assembly import LinearSystem, assemble
-from etc_engine.engines.dtem.element import Elements
+from etc_engine.engines.dtem.element import Elements, Resistances
 from etc_engine.engines.dtem.facet_elements import (
     SMALL_FACET,
     FacetMaterial,
@@ -44,8 +44,8 @@ class FacetSolution:
         temperature gradient of 1 along a periodic axis.
     sides : FacetSides
     material : FacetMaterial
-    resistances : (ndarray, ndarray)
-        Matrices H of all spheres, packed as (starts, values) [K/W].
+    resistances : Resistances
+        Matrices H of all spheres.
     temperatures : ndarray, shape (s, k) [K]
         Node temperature at each side; along a periodic axis measured from the mean gradient at the sphere's centre.
     heat_flows : ndarray, shape (s, k) [W]
@@ -59,7 +59,7 @@ class FacetSolution:
     axes: tuple[int, ...]
     sides: FacetSides
     material: FacetMaterial
-    resistances: tuple[NDArray[np.int64], NDArray[np.float64]]
+    resistances: Resistances
     temperatures: NDArray[np.float64]
     heat_flows: NDArray[np.float64]
     energies: NDArray[np.float64]
@@ -81,7 +81,7 @@ class FacetSolution:
     @cached_property
     def sphere_temperatures(self) -> NDArray[np.float64]:
         """Mean temperature of every sphere, T_o = T_i - sum_j H_ij Q_j of its first facet, shape (n, k) [K]."""
-        starts, values = self.resistances
+        starts, values = self.resistances.starts, self.resistances.values
         sizes = np.diff(self.sides.offsets)
         first_row = np.repeat(starts[:-1] - self.sides.offsets[:-1], sizes) + np.arange(self.sides.nodes.size)
         rise = values[first_row, None] * self.heat_flows
@@ -161,18 +161,36 @@ def solve_facets(
     Conjugate gradients, preconditioned by the elements as stars (`etc_engine.solvers.star`): 2 to 20 iterations.
     """
     sides = facet_sides(links, driven_walls(links, axes), bool((material.open_fluid > 0.0).all()))
-    starts, resistances = facet_resistances(links, material, sides)
-    elements = facet_elements(sides, starts, resistances)
-    system = assemble(elements, *_prescribe(links, sides, axes))
-    u, reports = _solve(system, elements, resistances, tolerance)
+    return solve_sides(links, material, axes, sides, tolerance=tolerance)[0]
+
+
+def solve_sides(
+    links: FacetLinks,
+    material: FacetMaterial,
+    axes: tuple[int, ...],
+    sides: FacetSides,
+    *,
+    tolerance: float = 1e-10,
+    nearby: FacetSolution | None = None,
+) -> tuple[FacetSolution, Elements]:
+    """`solve_facets` on known sides, with its elements; starts from the solution of a similar material on them."""
+    h = facet_resistances(links, material, sides)
+    elements = facet_elements(sides, h)
+    lift, prescribed = lift_and_prescribed(links, sides, axes)
+    system = assemble(elements, lift, prescribed)
+    rows = system.free[elements.nodes]
+    initial = np.zeros(system.rhs.shape)
+    if nearby is not None:
+        initial[rows[rows >= 0]] = (nearby.temperatures - lift)[rows >= 0]
+    u, reports = _solve(system, elements, h.values, initial, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
-    return FacetSolution(
-        links, axes, sides, material, (starts, resistances), temperatures, flows, temperatures.T @ flows, reports
-    )
+    energies = temperatures.T @ flows
+    solution = FacetSolution(links, axes, sides, material, h, temperatures, flows, energies, reports)
+    return solution, elements
 
 
-def _prescribe(
+def lift_and_prescribed(
     links: FacetLinks, sides: FacetSides, axes: tuple[int, ...]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Lift and prescribed nodes: the driven walls, or the jumps of periodic axes and one pinned node."""
@@ -188,7 +206,11 @@ def _prescribe(
 
 
 def _solve(
-    system: LinearSystem, elements: Elements, resistances: NDArray[np.float64], tolerance: float
+    system: LinearSystem,
+    elements: Elements,
+    resistances: NDArray[np.float64],
+    initial: NDArray[np.float64],
+    tolerance: float,
 ) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
     """Free temperatures of all loads."""
     size = system.matrix.shape[0]
@@ -200,7 +222,12 @@ def _solve(
     diagonal = resistances[elements.starts[owner] + local * (widths[owner] + 1)]
     preconditioner = star_preconditioner(system.free[elements.nodes], owner, 1.0 / diagonal, size)
     return solve_loads(
-        system.matrix, system.rhs, system.lift_energies, preconditioner=preconditioner, tolerance=tolerance
+        system.matrix,
+        system.rhs,
+        system.lift_energies,
+        preconditioner=preconditioner,
+        initial=initial,
+        tolerance=tolerance,
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.interior import temperatures_inside
 from etc_engine.engines.dtem.methods import find_method
+from etc_engine.engines.dtem.sphere_interior import temperatures_inside_spheres
 from etc_engine.engines.dtem.steady import SteadySolution
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.links import fill_dead_ends
@@ -84,6 +85,5 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
         face_temperatures=at_contact[:, None] - drops,
         flow_modes=flows,
     )
-    if packing.dimension != 2:  # temperatures inside are known of disks
-        return field
-    return replace(field, inside=partial(temperatures_inside, field, solution.method))
+    inside = {2: temperatures_inside, 3: temperatures_inside_spheres}[packing.dimension]
+    return replace(field, inside=partial(inside, field, solution.method))

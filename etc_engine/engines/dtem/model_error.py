@@ -21,6 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.element import DiskContacts, disk_contacts
+from etc_engine.engines.dtem.sphere_error import sphere_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution
 from etc_engine.errors import InputError
 from etc_engine.medium.sides import ContactSides
@@ -86,7 +87,8 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
 
     Notes
     -----
-    An estimate, not a bound: method ``exact`` gives bounds. The disks cut off by insulated walls, and dead ends, which
+    Of spheres: see `etc_engine.engines.dtem.sphere_error`. An estimate, not a bound: method
+    ``exact`` gives bounds. The disks cut off by insulated walls, and dead ends, which
     ``chord`` leaves out, are not in it.
 
     Examples
@@ -103,6 +105,9 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     """
     if solution.method != "chord":
         raise InputError(f"the error is estimated for method chord, found a solution by {solution.method}")
+    if solution.sides.dimension == 3:
+        kappa, energy = solution.medium.conductivity, float(solution.energies[load, load])
+        return sphere_error_estimate(solution.sides, kappa, solution.heat_flows[:, load], energy)
     parts = np.multiply(COEFFICIENTS, chord_error_terms(solution, load)) * [1.0, 1.0, -1.0]
     flows = np.abs(solution.heat_flows[:, load])
     rest = LEAST * (flows @ np.sin(solution.sides.alpha) ** 4) / max(float(flows.sum()), np.finfo(float).tiny)

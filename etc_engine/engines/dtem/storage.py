@@ -117,37 +117,69 @@ def storing_elements(
     InputError
         If the method has no such form.
     """
-    dimension, law = sides.dimension, law_of(sides.dimension)
+    dimension = sides.dimension
     variant, modes = find_method(method, dimension), flux_modes(method, modes, dimension)
     if variant.resistances is None:
         raise InputError(f"method {method} has no transient form: choose chord, arc, standard or enhanced")
     h = variant.resistances(sides, conductivity, modes)
-    states = dimension + 1 if dipoles else 1
-    count = sides.offsets.size - 1
-    contact_rows = modes * np.diff(sides.offsets)
+    scales = conductivity * length_scales(sides.radii, dimension)
+    elements, bad = with_states(h, sides.offsets, sides.nodes, scales, dimension, dipoles=dipoles)
+    if bad >= 0:
+        raise GeometryError(_indefinite(bad, sides, method, dipoles))
+    return elements
+
+
+def with_states(
+    h: Resistances,
+    contact_offsets: NDArray[np.int64],
+    contact_nodes: NDArray[np.int64],
+    scales: NDArray[np.float64],
+    dimension: int,
+    *,
+    dipoles: bool,
+) -> tuple[Elements, int]:
+    """Elements over contacts and states from resistance matrices.
+
+    Parameters
+    ----------
+    h : Resistances
+    contact_offsets, contact_nodes : ndarray of int, shape (n + 1,), (s,)
+        Sides of each particle, and the contact of each side.
+    scales : ndarray, shape (n,)
+        kappa R^(d-2).
+    dimension : int
+    dipoles : bool
+
+    Returns
+    -------
+    Elements
+    int
+        First particle without a positive definite matrix, or -1.
+    """
+    law, modes, states = law_of(dimension), h.modes, dimension + 1 if dipoles else 1
+    count = contact_offsets.size - 1
+    contact_rows = modes * np.diff(contact_offsets)
     offsets = np.concatenate([[0], np.cumsum(contact_rows + states)])
     starts = packed_starts(offsets)
     values = np.zeros(int(starts[-1]))
     bad = _fill(
-        modes * sides.offsets,
+        modes * contact_offsets,
         h,
-        np.ascontiguousarray(conductivity * length_scales(sides.radii, dimension)),
+        np.ascontiguousarray(scales),
         (law.warming, law.harmonic, law.share),
         readings_of_parts(dimension) if dipoles else np.ones((1, 1)),
         starts,
         values,
     )
-    if bad >= 0:
-        raise GeometryError(_indefinite(bad, sides, method, dipoles))
-    size = modes * (sides.nodes.max(initial=-1) + 1)
+    size = modes * (contact_nodes.max(initial=-1) + 1)
     nodes = np.empty(int(offsets[-1]), dtype=np.int64)
     is_state = np.ones(nodes.size, dtype=np.bool_)
     shift = states * np.repeat(np.arange(count), contact_rows)
-    at = np.arange(modes * sides.nodes.size) + shift
+    at = np.arange(modes * contact_nodes.size) + shift
     is_state[at] = False
-    nodes[at] = (modes * sides.nodes[:, None] + np.arange(modes)).ravel()
+    nodes[at] = (modes * contact_nodes[:, None] + np.arange(modes)).ravel()
     nodes[is_state] = size + np.arange(states * count)
-    return Elements(modes, offsets, nodes, starts, values)
+    return Elements(modes, offsets, nodes, starts, values), int(bad)
 
 
 def _indefinite(particle: int, sides: ContactSides, method: str, dipoles: bool) -> str:

@@ -16,7 +16,7 @@ from etc_engine.medium.conductivity import EffectiveConductivity, effective_tens
 from etc_engine.medium.links import LinkSolution, solve_links
 from etc_engine.medium.medium import Medium
 
-PIPES: Mapping[str, str] = {"chord": "chord", "uniform": "standard"}
+PIPES: Mapping[str, str] = {"chord": "chord", "uniform": "standard", "holm": "holm", "root-area": "root-area"}
 """Methods: what the resistance of a pipe is, and the law of that self-resistance h_ii."""
 
 

@@ -10,8 +10,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 
-from etc_engine.errors import InputError
 from etc_engine.medium.field import ParticleField
+from etc_engine.output.figures.spheres import save_spheres
 from etc_engine.output.raster import sample_image
 
 DETAILED = 3_000
@@ -31,15 +31,11 @@ def save_field(path: Path, field: ParticleField, caption: str = "") -> None:
         Where nothing is known inside the particles, they are drawn in their mean temperatures.
     caption : str
         Line above the picture.
-
-    Raises
-    ------
-    InputError
-        If the particles are no disks.
     """
     packing = field.medium.packing
-    if packing.dimension != 2:
-        raise InputError("the picture of a temperature field draws disks, the particles are spheres: leave --plot out")
+    if packing.dimension == 3:
+        save_spheres(path, field, caption)
+        return
     width, height = packing.box.lengths
     scale = 6.5 / max(width, height)
     figure = Figure(figsize=(max(width * scale, 2.5) + 1.6, max(height * scale, 1.5) + 0.7), layout="constrained")

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution
 from etc_engine.engines.dtem.cell.rim_grid import BONDED
-from etc_engine.engines.dtem.cell.steady import CellSolution, build_model, solve_model
+from etc_engine.engines.dtem.cell.steady import CellModel, CellSolution, build_model, solve_model
 from etc_engine.errors import InputError
+from etc_engine.medium.conductivity import check_balance, conductivities
+from etc_engine.medium.loads import asked_groups
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +43,7 @@ class CellConductivity:
     dual : bool
         Whether it comes from the inverse conductivities, because disks conduct worse than the fluid.
     solutions : tuple of CellSolution
-        The solutions behind it (of the inverse conductivities if dual).
+        Temperatures under the loads. If dual, they are less exact than the tensor, which does not come from them.
     spread : float
         Relative difference between the direct and the dual value where some disks conduct better and some worse than
         the fluid; the tensor is then their mean. 0 otherwise.
@@ -111,7 +113,10 @@ def cell_conductivity(
     if not (fluid > 0.0 and np.isfinite(fluid)):
         raise InputError(f"the cell element needs a pore conductivity that is positive and finite, found {fluid}")
     if not ((solid > 0.0) & np.isfinite(solid)).all():
-        raise InputError("the cell element needs particle conductivities that are positive and finite")
+        raise InputError(
+            "the cell element needs particle conductivities that are positive and finite: "
+            "give insulators and perfect conductors a small and a large one"
+        )
     better, worse = float(solid.max()) > ALIKE * fluid, float(solid.min()) * ALIKE < fluid
     if not worse:
         return CellConductivity(*_direct(geometry, solid, fluid, axes, resolution, tolerance, dual=False))
@@ -122,9 +127,9 @@ def cell_conductivity(
             f"contact resistances with method cell: use the overlap rule without resistances, or the voxel engine"
         )
     dual = CellConductivity(*_direct(geometry, 1.0 / solid, 1.0 / fluid, axes, resolution, tolerance, dual=True))
-    if not better:
-        return dual
     tensor, _, solutions = _direct(geometry, solid, fluid, axes, resolution, tolerance, dual=False)
+    if not better:
+        return CellConductivity(dual.tensor, True, solutions)
     spread = float(np.nanmax(np.abs(np.diag(tensor - dual.tensor)) / np.diag(tensor)))
     return CellConductivity(0.5 * (tensor + dual.tensor), False, solutions, spread)
 
@@ -143,18 +148,18 @@ def _direct(
     box = geometry.box
     asked = (0, 1) if axes is None else axes
     needed = asked if not dual else ((0, 1) if all(box.periodic) else tuple(sorted(1 - axis for axis in asked)))
-    model = build_model(geometry, solid, fluid, resolution)
-    groups = [tuple(axis for axis in needed if box.periodic[axis])]
-    groups += [(axis,) for axis in needed if not box.periodic[axis]]
     tensor = np.full((2, 2), np.nan)
+    models: dict[int, CellModel] = {}
     solutions = []
-    for group in filter(None, groups):
-        solution = solve_model(model, group, tolerance=tolerance)
-        if box.periodic[group[0]]:
-            tensor[np.ix_(group, group)] = 0.5 * (solution.energies + solution.energies.T) / box.volume
-        else:
-            axis = group[0]
-            tensor[axis, axis] = solution.energies[0, 0] * box.lengths[axis] / box.cross_section(axis)
+    for group in asked_groups(box, needed):
+        driven = geometry.driven_by(group)
+        key = id(driven)
+        if key not in models:
+            models = {key: build_model(driven, solid, fluid, resolution)}
+        solution = solve_model(models[key], group, tolerance=tolerance)
+        if not box.periodic[group[0]]:
+            check_balance(*solution.wall_heat(), float(solution.energies[0, 0]))
+        tensor[np.ix_(group, group)] = conductivities(box, group, solution.energies)
         solutions.append(solution)
     if dual:
         tensor = dual_tensor(tensor)

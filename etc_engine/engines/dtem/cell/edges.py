@@ -122,8 +122,9 @@ def cell_edges(cells: LaguerreCells, radii: Floats, contacts: EdgeContacts | Non
     clearances = 0.5 * gaps[:, None] * (gaps[:, None] + 2.0 * pair[:, ::-1]) / apart[:, None]
     distances = pair + clearances
     chord = np.sqrt(np.maximum(-clearances[:, 0] * (pair[:, 0] + distances[:, 0]), 0.0))
-    half_angles = np.where((gaps < 0.0)[:, None] & (chord[:, None] >= pair * np.sin(contacts.half_angles)), 0.0, 1.0)
-    half_angles = half_angles * contacts.half_angles
+    # where the overlap is wider than a prescribed contact, it is the contact
+    cut = (gaps < 0.0) & (chord >= (pair * np.sin(contacts.half_angles)).min(axis=1))
+    half_angles = np.where(cut[:, None], 0.0, contacts.half_angles)
     bonded = half_angles.max(axis=1) > 0.0
     own = np.where(bonded[:, None], distances * np.tan(half_angles), chord[:, None])
     neck = ~bonded & (gaps >= 0.0) & (contacts.necks > 0.0)
@@ -145,6 +146,24 @@ def cell_edges(cells: LaguerreCells, radii: Floats, contacts: EdgeContacts | Non
         cells.at_wall,
         smaller,
         contacts.uniform_jump,
+    )
+
+
+def release_contacts(edges: CellEdges, rows: NDArray[np.bool_]) -> CellEdges:
+    """The same edges with the marked prescribed contacts taken away; overlaps stay.
+
+    Parameters
+    ----------
+    edges : CellEdges
+    rows : ndarray of bool, shape (m,)
+    """
+    free = rows & ((edges.kind == BONDED) | (edges.kind == NECK)) & (edges.clearances[:, 0] >= 0.0)
+    return edges._replace(
+        kind=np.where(free, np.where(edges.widths > 0.0, GAP, TOUCHING), edges.kind),
+        corners=np.where(free, 0.0, edges.corners),
+        own_corners=np.where(free[:, None], 0.0, edges.own_corners),
+        half_angles=np.where(free[:, None], 0.0, edges.half_angles),
+        resistances=np.where(free, 0.0, edges.resistances),
     )
 
 

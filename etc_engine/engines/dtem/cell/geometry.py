@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.box import Box
-from etc_engine.engines.dtem.cell.edges import CellEdges, EdgeContacts, cell_edges, grid_edges
+from etc_engine.engines.dtem.cell.edges import CellEdges, EdgeContacts, cell_edges, grid_edges, release_contacts
 from etc_engine.engines.dtem.cell.frame import MOST_DEGREES, Frame, build_frame, edge_degrees
 from etc_engine.engines.dtem.cell.rim_grid import CORNER, LONGEST, EdgeGrid
 from etc_engine.errors import InputError
@@ -43,6 +43,16 @@ class CellGeometry:
     def count(self) -> int:
         """Number of disks."""
         return int(self.radii.size)
+
+    def driven_by(self, axes: tuple[int, ...]) -> CellGeometry:
+        """The cells under a load, which drives the walls of walled axes only."""
+        return self.with_walls(np.repeat([axis in axes and not self.box.periodic[axis] for axis in range(2)], 2))
+
+    def with_walls(self, driven: NDArray[np.bool_]) -> CellGeometry:
+        """The cells with contacts at the marked walls, shape (4,); elsewhere a prescribed one is no contact."""
+        idle = self.cells.at_wall & (self.edges.corners > 0.0)
+        idle[idle] = ~driven[-1 - self.cells.cells[idle, 1]]
+        return replace(self, edges=release_contacts(self.edges, idle)) if idle.any() else self
 
 
 @dataclass(frozen=True)

@@ -77,13 +77,28 @@ def recover_cells(solution: CellSolution, load: int = 0) -> CellField:
     either edge that ends there, which is good to a few per cent.
     """
     model = solution.model
-    cells, frame, geometry = model.geometry.cells, model.frame, model.geometry
+    frame, geometry = model.frame, model.geometry
     values = solution.fluctuations[frame.unknowns, load]
     centers = np.zeros(geometry.count)
     if solution.periodic:
         axis = solution.axes[load]
         values = values + frame.positions[:, axis]
         centers = geometry.centers[:, axis]
+    return recover_values(model, values, centers)
+
+
+def recover_values(model: CellModel, values: Floats, shifts: Floats) -> CellField:
+    """Temperatures inside cells from those on their frames.
+
+    Parameters
+    ----------
+    model : CellModel
+    values : ndarray [K]
+        One for each entry of ``model.frame.unknowns``.
+    shifts : ndarray, shape (n,) [K]
+        Added to the temperatures of each cell.
+    """
+    cells, frame, geometry = model.geometry.cells, model.frame, model.geometry
     nodes = rim_nodes(cells, model.grid)
     starts = np.concatenate(([0], np.cumsum(nodes)))
     out = np.empty((5, starts[-1]))
@@ -100,8 +115,8 @@ def recover_cells(solution: CellSolution, load: int = 0) -> CellField:
         (starts, out, sides, flows),
     )
     owner = np.repeat(np.arange(geometry.count), nodes)
-    out[1] += centers[owner]
-    out[2] += centers[owner]
+    out[1] += shifts[owner]
+    out[2] += shifts[owner]
     signed = np.where(cells.forward, -1.0, 1.0) * flows
     number = np.bincount(cells.edges, minlength=cells.edge_count)
     edge_flows = np.bincount(cells.edges, signed, minlength=cells.edge_count) / number
@@ -146,6 +161,8 @@ def _recover(cells, edges, grid, frame, materials, work, result):  # type: ignor
             sides[row] = cells[0][i] + side
         flow = out[4, offsets[i] : offsets[i] + count]
         _edge_node_flows(i, count, edges, rim, numbers, materials, dense, out[:, offsets[i] :], second, local, flow)
+        if storing:
+            _add_stored(count, rim[0], materials[1][i], out[1, offsets[i] :], dense[size - 1], flow)
         for c in range(count):
             side = rim[1][c]
             before_side = side - 1 if side > 0 else polygon - 1
@@ -153,6 +170,20 @@ def _recover(cells, edges, grid, frame, materials, work, result):  # type: ignor
             flows[cells[0][i] + side] += 0.5 * flow[c] if at_vertex else flow[c]
             if at_vertex:
                 flows[cells[0][i] + before_side] += 0.5 * flow[c]
+
+
+@njit(cache=True)
+def _add_stored(count, angles, solid, rim, mean, flow):  # type: ignore[no-untyped-def]
+    """Add the heat that a disk takes up, 8 pi k (mean of the rim - mean of the disk), evenly over its rim."""
+    part = np.empty(count)
+    lag = -mean
+    for c in range(count):
+        before = angles[c - 1] if c > 0 else angles[count - 1] - 2.0 * np.pi
+        after = angles[c + 1] if c < count - 1 else angles[0] + 2.0 * np.pi
+        part[c] = (after - before) / (4.0 * np.pi)
+        lag += part[c] * rim[c]
+    for c in range(count):
+        flow[c] += 8.0 * np.pi * solid * lag * part[c]
 
 
 @njit(cache=True)

@@ -68,7 +68,7 @@ class CellSolution:
         """Whether the loads are mean gradients along periodic axes."""
         return self.model.geometry.box.periodic[self.axes[0]]
 
-    def wall_heat_flows(self) -> tuple[float, float]:
+    def wall_heat(self) -> tuple[float, float]:
         """Heat flow in at the low wall and out at the far wall of a walled load [W/m]."""
         reactions = self.model.system.matrix @ self.fluctuations[:, 0]
         low, far = (wall_unknowns(self.model, 2 * self.axes[0] + end) for end in range(2))

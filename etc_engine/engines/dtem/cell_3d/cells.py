@@ -15,7 +15,7 @@ from etc_engine.engines.dtem.cell_3d.shell import radial_moments
 from etc_engine.engines.dtem.cell_3d.sphere_energy import green_table
 from etc_engine.engines.dtem.cell_3d.topology import CellTopology
 from etc_engine.errors import InputError
-from etc_engine.laws.sphere import resistance_matrices
+from etc_engine.laws.sphere_dents import resistance_matrices
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

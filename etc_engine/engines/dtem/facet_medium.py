@@ -1,0 +1,333 @@
+"""Facet links on a medium: conductivity of one and of many, fields, and spheres that store heat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.engines.dtem.assembly import assemble
+from etc_engine.engines.dtem.facet_elements import FacetMaterial, FacetSides, facet_resistances, facet_sides
+from etc_engine.engines.dtem.facet_family import FEW_MATERIALS, FamilyMember, solve_family
+from etc_engine.engines.dtem.facet_steady import (
+    FacetSolution,
+    facet_conductivity,
+    low_coordination_warning,
+    uniform_material,
+)
+from etc_engine.engines.dtem.storage import with_states
+from etc_engine.errors import EtcError, GeometryError
+from etc_engine.medium.conduction import Conduction, Result, attempt
+from etc_engine.medium.conductivity import EffectiveConductivity, conductivities
+from etc_engine.medium.facets import FacetLinks, facet_links, links_network, no_contacts
+from etc_engine.medium.field import ParticleField
+from etc_engine.medium.loads import asked_groups, driven_walls, wall_temperatures
+from etc_engine.medium.medium import Medium, check_conductors
+from etc_engine.medium.sides import ContactSides, contact_sides
+from etc_engine.medium.transient import ParticleSystem, Source, joined_walls, particle_capacities, state_source
+from etc_engine.medium.wall_nodes import heat_system, number_nodes
+from etc_engine.medium.walls import WallCondition, wall_conditions
+
+Floats = NDArray[np.float64]
+
+
+def medium_links(medium: Medium) -> FacetLinks:
+    """Facets of the packing of a medium, with the contacts of its network if it has one.
+
+    Raises
+    ------
+    GeometryError
+        If a sphere is hidden.
+    """
+    return facet_links(medium.network or no_contacts(medium.packing))
+
+
+def medium_material(medium: Medium, links: FacetLinks) -> FacetMaterial:
+    """What spheres and pores of a medium are made of.
+
+    Raises
+    ------
+    InputError
+        If a sphere conducts less than the pores.
+    """
+    check_conductors(medium)
+    pores = medium.pores
+    return uniform_material(
+        links, medium.conductivity, pores.conductivity, pores.jump_length, pores.radiation, pores.in_open_pores
+    )
+
+
+def sphere_conductivity(
+    medium: Medium,
+    *,
+    axes: tuple[int, ...] | None = None,
+    tolerance: float = 1e-10,
+    links: FacetLinks | None = None,
+) -> EffectiveConductivity[FacetSolution]:
+    """Effective conductivity of spheres and of the fluid between them, by facet links.
+
+    Parameters
+    ----------
+    medium : Medium
+        Three-dimensional, with pores that conduct or radiate. Contacts are those of its network.
+    axes : tuple of int, optional
+        Load axes; all by default.
+    tolerance : float
+        Relative error of the conductivity left by the solver.
+    links : FacetLinks, optional
+        Of the same network, if already known.
+
+    Returns
+    -------
+    EffectiveConductivity
+        Every axis is spanned, through the pores.
+
+    Raises
+    ------
+    InputError, GeometryError, ConvergenceError
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.medium import Pores
+    >>> from etc_engine.packing.particles import ParticlePacking
+    >>> cell = ParticlePacking([[0.25] * 3, [0.75] * 3], [0.43, 0.43], Box((1.0, 1.0, 1.0), (True, True, True)))
+    >>> round(sphere_conductivity(Medium(cell, 10.0, pores=Pores(1.0))).mean, 2)  # multipoles: 4.43
+    4.44
+    """
+    links = links or medium_links(medium)
+    return facet_conductivity(links, medium_material(medium, links), tolerance=tolerance, axes=axes)
+
+
+def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
+    """Effective conductivity of media on one packing, one result per medium.
+
+    Media with the same contacts share their facets. At least `FEW_MATERIALS` of them, which differ in temperature,
+    pressure or a conductivity, are solved together (`etc_engine.engines.dtem.facet_family`), unless the option
+    ``material_curve`` is ``full``; what that cannot solve is solved alone, which says why.
+    """
+    together: dict[int, list[int]] = {}
+    for row, medium in enumerate(media):
+        together.setdefault(id(medium.network), []).append(row)
+    found: dict[int, Result] = {}
+    for rows in together.values():
+        try:
+            links = medium_links(media[rows[0]])
+        except EtcError as error:
+            found.update(dict.fromkeys(rows, error))
+            continue
+        if len(rows) >= FEW_MATERIALS and conduction.options.get("material_curve", "reduced") == "reduced":
+            found.update(_family(media, rows, links, conduction))
+        for row in rows:
+            if row not in found:
+                solve = partial(
+                    sphere_conductivity,
+                    media[row],
+                    axes=conduction.axes,
+                    tolerance=conduction.tolerance,
+                    links=links,
+                )
+                found[row] = attempt(solve)
+    return [found[row] for row in range(len(media))]
+
+
+def _family(
+    media: Sequence[Medium], rows: Sequence[int], links: FacetLinks, conduction: Conduction
+) -> dict[int, Result]:
+    """Results of the media that could be solved together."""
+    axes, box = conduction.axes, links.packing.box
+    try:
+        materials = [medium_material(media[row], links) for row in rows]
+        by_group = {
+            group: solve_family(links, materials, group, tolerance=conduction.tolerance)
+            for group in asked_groups(box, axes)
+        }
+    except EtcError:
+        return {}
+    return {
+        row: _joined(links, {group: members[place] for group, members in by_group.items()})
+        for place, row in enumerate(rows)
+    }
+
+
+def _joined(links: FacetLinks, members: Mapping[tuple[int, ...], FamilyMember]) -> EffectiveConductivity[FacetSolution]:
+    """The load groups of one medium as one conductivity."""
+    box = links.packing.box
+    tensor = np.full((3, 3), np.nan)
+    spanned: list[bool | None] = [None] * 3
+    for group, member in members.items():
+        tensor[np.ix_(group, group)] = conductivities(box, group, member.energies)
+        for axis in group:
+            spanned[axis] = True
+    solutions = tuple(member.solution for member in members.values() if member.solution is not None)
+    reports = [report for solution in solutions for report in solution.reports]
+    full = len(solutions) == len(members)
+    return EffectiveConductivity(
+        tensor,
+        tuple(spanned),
+        max((report.unknowns for report in reports), default=0),
+        max((report.iterations for report in reports), default=0),
+        max([member.relative_error for member in members.values()] + [r.relative_energy_error for r in reports]),
+        solutions if full else (),
+        snapshots=0 if full else max(member.anchors for member in members.values()),
+    )
+
+
+def accuracy_remarks(_: str, result: EffectiveConductivity[FacetSolution]) -> tuple[str, ...]:
+    """A warning where spheres with few facets conduct much better than the pores."""
+    if not result.solutions:
+        return ()
+    text = low_coordination_warning(result.solutions[0].links, result.solutions[0].material)
+    return (text,) if text else ()
+
+
+def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> ParticleField:
+    """Temperatures and heat flows of spheres in a fluid: every facet is a link, of half-angle 0 where it is a gap.
+
+    Parameters
+    ----------
+    medium : Medium
+    solution : FacetSolution
+        Of the medium.
+    load : int
+        Column of the solution.
+
+    Notes
+    -----
+    The temperature of a link is that of its rings, or of its column of fluid where it has none. Walls without a
+    temperature take no heat; theirs is that of the sphere.
+    """
+    links, sides, axis = solution.links, solution.sides, solution.axes[load]
+    network = links_network(links, medium.network.rule if medium.network else "none")
+    m, w = links.count, links.walls.size
+    into = _into_links(sides, links, solution.heat_flows[:, load])
+    mean = solution.sphere_temperatures[:, load].copy()
+    node = solution.temperatures[:, load].copy()
+    if links.packing.box.periodic[axis]:
+        centers = links.packing.centers[:, axis]
+        mean += centers
+        node += np.repeat(centers, np.diff(sides.offsets))
+    of_links = np.concatenate([mean[links.pairs[:, 0]], mean[links.wall_particles]])
+    first = np.flatnonzero(sides.ends == 0)
+    first = first[np.argsort(sides.columns[sides.nodes[first]] == 0.0, kind="stable")]  # rings last: they count
+    of_links[sides.links[sides.nodes[first]]] = node[first]
+    driven = driven_walls(links, solution.axes)
+    at_walls = np.where(driven, wall_temperatures(links.walls), of_links[m:])
+    contact = contact_sides(network)
+    modes = np.zeros((contact.nodes.size, 1))
+    modes[contact.of_contacts, 0] = into[:m]
+    modes[contact.of_walls, 0] = into[m : m + w, 0]
+    return ParticleField(
+        medium=medium.with_network(network),
+        axis=axis,
+        sides=contact,
+        particle_temperatures=mean,
+        contact_temperatures=of_links[:m],
+        wall_temperatures=at_walls,
+        contact_flows=into[:m, 1],
+        wall_flows=-into[m:, 0],
+        face_temperatures=np.column_stack([of_links[:m], of_links[:m]]),
+        flow_modes=modes,
+    )
+
+
+def _into_links(sides: FacetSides, links: FacetLinks, flows: Floats) -> Floats:
+    """Heat into the sphere at either end of each link, rings and columns together, shape (m + w, 2)."""
+    place = 2 * sides.links[sides.nodes] + sides.ends
+    total = np.bincount(place, weights=flows, minlength=2 * (links.count + links.walls.size))
+    return np.asarray(total, dtype=np.float64).reshape(-1, 2)
+
+
+def sphere_system(
+    medium: Medium,
+    walls: Mapping[str, WallCondition],
+    *,
+    method: str = "facets",
+    dipoles: bool = False,
+    source: Source = 0.0,
+    capacities: Floats | None = None,
+    **_: object,
+) -> ParticleSystem:
+    """Spheres that store heat, with the fluid around them, and the conditions at the walls of the box.
+
+    Parameters
+    ----------
+    medium : Medium
+        Three-dimensional, with heat capacities, and pores that conduct (and may store heat).
+    walls : mapping of str to condition
+        By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
+    method : str
+        ``facets``.
+    dipoles : bool
+        Whether the spheres have dipole states, for earlier times.
+    source : float, array_like, shape (n,), or callable of t [W]
+        Heat set free evenly in all spheres, or in each.
+    capacities : ndarray, shape (n,), optional [J/K]
+        Of the spheres; rho c times what their contacts leave of them by default. That of the fluid is added.
+
+    Returns
+    -------
+    ParticleSystem
+        With 4 states per sphere with dipoles, otherwise 1. Its medium has a link for every facet.
+
+    Raises
+    ------
+    InputError, GeometryError
+
+    Notes
+    -----
+    The fluid of a Laguerre cell stores its heat at the mean temperature of the sphere inside. At rest the temperatures
+    are those of the steady method.
+    """
+    links = medium_links(medium)
+    material = medium_material(medium, links)
+    conditions = wall_conditions(medium.box, walls)
+    kept = joined_walls(links.walls, conditions)
+    sides = facet_sides(links, kept, bool((material.open_fluid > 0.0).all()))
+    scales = material.conductivity * links.packing.radii
+    h = facet_resistances(links, material, sides)
+    elements, bad = with_states(h, sides.offsets, sides.nodes, scales, 3, dipoles=dipoles)
+    if bad >= 0:
+        cure = "leave the dipoles out or use smaller contacts" if dipoles else "use smaller contacts"
+        raise GeometryError(
+            f"sphere {bad} has no positive definite resistance to heat that it stores (method {method}): {cure}"
+        )
+    n, states = medium.packing.count, 4 if dipoles else 1
+    stored = np.repeat(_capacities(medium, links, capacities) / states, states)
+    at_walls = sides.links[sides.links >= links.count] - links.count
+    between = sides.links.size - at_walls.size
+    nodes = number_nodes(medium.box, links.walls[at_walls], conditions, contacts=between, states=stored.size)
+    count = nodes.unknowns.size
+    whole = assemble(elements, np.zeros((elements.nodes.size, 0)), np.zeros(count, dtype=np.bool_)).matrix
+    system = heat_system(whole, nodes, stored, state_source(source, n, states))
+    network = links_network(links, medium.network.rule if medium.network else "none")
+    seen = contact_sides(network.select(np.ones(links.count, dtype=np.bool_), kept))
+    is_facet = elements.nodes < count - stored.size
+
+    def flows(time: float, unknowns: Floats) -> Floats:
+        """Q = A (T_c - T_o e), of rings and columns together."""
+        rows = made.node_temperatures(time, unknowns)[elements.nodes]
+        into = _into_links(sides, links, elements.apply(rows[:, None])[is_facet, 0])
+        return _by_side(seen, into[: links.count], into[links.count :][kept, 0])
+
+    made = ParticleSystem(system, medium.with_network(network), nodes, seen, np.flatnonzero(kept), flows)
+    return made
+
+
+def _by_side(sides: ContactSides, between: Floats, at_walls: Floats) -> Floats:
+    out = np.empty(sides.nodes.size)
+    out[sides.of_contacts] = between
+    out[sides.of_walls] = at_walls
+    return out
+
+
+def _capacities(medium: Medium, links: FacetLinks, given: Floats | None) -> Floats:
+    """Heat capacity of every sphere and of the fluid of its cell, shape (n,) [J/K]."""
+    network = medium.network or no_contacts(medium.packing)
+    whole = medium if medium.network else replace(medium, network=network)
+    solid = particle_capacities(whole, given, cut=False)
+    fluid = np.maximum(links.volumes - network.cut_measures(), 0.0)
+    return np.asarray(solid + medium.pores.heat_capacity * fluid)

@@ -1,0 +1,88 @@
+"""Families of methods: how a method of thermal elements is solved, read and marched, by its name and dimension."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from etc_engine.engines.dtem import conductivity as elements
+from etc_engine.engines.dtem import facet_medium as sphere_facets
+from etc_engine.engines.dtem.cell import medium as disk_cells
+from etc_engine.engines.dtem.cell.transient import cell_system
+from etc_engine.engines.dtem.field import recover_field
+from etc_engine.engines.dtem.transient import element_system
+from etc_engine.medium.conduction import Conduction, Result
+from etc_engine.medium.conductivity import EffectiveConductivity
+from etc_engine.medium.field import ParticleField
+from etc_engine.medium.medium import Medium
+from etc_engine.medium.transient import ParticleSystem
+
+
+@dataclass(frozen=True)
+class Family:
+    """Methods that share their solver.
+
+    Parameters
+    ----------
+    solve : callable
+        (media, conduction) -> one result per medium.
+    recover : callable
+        (medium, solution, load) -> ParticleField.
+    remarks : callable
+        (method, result) -> what a user should know about the accuracy of a result.
+    system : callable, optional
+        (medium, walls, method=, source=, capacities=, options) -> ParticleSystem.
+    """
+
+    solve: Callable[[Sequence[Medium], Conduction], list[Result]]
+    recover: Callable[[Medium, Any, int], ParticleField]
+    remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
+    system: Callable[..., ParticleSystem] | None = None
+
+
+CONTACTS = Family(
+    elements.solve_series,
+    lambda _, solution, load: recover_field(solution, load),
+    elements.accuracy_remarks,
+    element_system,
+)
+"""Elements whose nodes are the contacts; heat takes no other way."""
+
+FAMILIES: Mapping[tuple[str, int], Family] = {
+    ("cell", 2): Family(disk_cells.solve_series, disk_cells.disk_field, disk_cells.accuracy_remarks, cell_system),
+    ("facets", 3): Family(
+        sphere_facets.solve_series,
+        sphere_facets.sphere_field,
+        sphere_facets.accuracy_remarks,
+        sphere_facets.sphere_system,
+    ),
+}
+"""Families by method and dimension; every other method is one of `CONTACTS`."""
+
+
+def family_of(method: str, dimension: int) -> Family:
+    """The family of a method."""
+    return FAMILIES.get((method, dimension), CONTACTS)
+
+
+def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
+    """Effective conductivity of media on one packing, one result per medium."""
+    return family_of(conduction.method, media[0].dimension).solve(media, conduction)
+
+
+def field_of(medium: Medium, method: str, solution: Any, load: int) -> ParticleField:
+    """Temperatures and heat flows of one load of a solution."""
+    return family_of(method, medium.dimension).recover(medium, solution, load)
+
+
+def system_of(medium: Medium, walls: Mapping[str, Any], *, method: str, **options: Any) -> ParticleSystem:
+    """A medium ready to be marched in time, by a method with a transient form."""
+    system = family_of(method, medium.dimension).system
+    assert system is not None, method
+    return system(medium, walls, method=method, **options)
+
+
+def remarks_on(method: str, result: EffectiveConductivity[Any]) -> tuple[str, ...]:
+    """What a user should know about the accuracy of a result."""
+    return family_of(method, result.tensor.shape[0]).remarks(method, result)
