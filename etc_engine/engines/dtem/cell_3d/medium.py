@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.facets import FacetLinks, facet_links
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.medium import Medium, check_conductors
+from etc_engine.medium.transient import ParticleSystem
 
 CONDUCTING, INSULATING = "1/1", "3/3"
 """Frames of spheres that conduct at least as well as the fluid, and of ones that conduct worse."""
@@ -131,21 +133,32 @@ def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result
     def alone(medium: Medium) -> EffectiveConductivity[SphereCellSolution]:
         if id(medium.links) not in known:
             known[id(medium.links)] = facet_links(medium.links)
-        options = dict(conduction.options)
-        refuse_options_of_disks(options)
         return sphere_conductivity(
             medium,
             axes=conduction.axes,
             tolerance=conduction.tolerance,
             links=known[id(medium.links)],
-            **options,
+            **conduction.options,
         )
 
     return [attempt(partial(alone, medium)) for medium in media]
 
 
-def sphere_field(medium: Medium, solution: SphereCellSolution, load: int = 0) -> ParticleField:
-    """Refuse: the cell element gives conductivity and mean temperatures of spheres, no flows of links."""
-    raise InputError(
-        "method cell has no picture of spheres in a fluid yet: use method facets for temperatures and flows"
-    )
+def sphere_field(*_: Any) -> ParticleField:
+    """Refuse: the element gives the conductivity and the mean temperatures of spheres, but no flows of links.
+
+    Raises
+    ------
+    InputError
+    """
+    raise InputError("method cell has no field of spheres: use method facets for temperatures and heat flows")
+
+
+def sphere_system(*_: Any, **__: Any) -> ParticleSystem:
+    """Refuse: spheres do not store heat in this element.
+
+    Raises
+    ------
+    InputError
+    """
+    raise InputError("method cell has no transient of spheres: use method facets")
