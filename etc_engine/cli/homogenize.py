@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from etc_engine.cli.particle_options import SampleWords, particle_options, read_sample
+from etc_engine.cli.image_options import ImageTask, ImageWords, image_options, write_image_result
+from etc_engine.cli.particle_options import SampleWords, parse_faces, particle_options, read_sample
 
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
@@ -27,9 +28,10 @@ LATTICE_PARTICLES = 20_000
 @click.command("homogenize")
 @click.argument("inclusions", type=click.Path(path_type=Path))
 @particle_options
+@image_options
 @click.option("--engine", default="voxel", show_default=True, help="voxel: FFT on voxels; lattice: particles.")
 @click.option("--method", help="Of voxel: laminate or binary, the kind of voxel; of lattice: laguerre or contact.")
-@click.option("--matrix", type=float, required=True, help="Conductivity of the matrix [W/(m K)].")
+@click.option("--matrix", type=float, help="Conductivity of the matrix [W/(m K)].")
 @click.option(
     "--inclusion", type=float, help="Conductivity of the inclusions [W/(m K)]; a column of the file is used instead."
 )
@@ -54,6 +56,7 @@ LATTICE_PARTICLES = 20_000
 def homogenize_command(
     inclusions: Path,
     words: SampleWords,
+    image: ImageWords,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -62,8 +65,10 @@ def homogenize_command(
     """Effective conductivity tensor of disks or spheres in a matrix.
 
     INCLUSIONS is a CSV file with the columns x,y,radius or x,y,z,radius (optionally conductivity), a LAMMPS/LIGGGHTS
-    text dump, or a netCDF or VTK file as ``pack`` writes it. Overlapping inclusions count as their union; where
-    their conductivities differ the radical plane divides them. 0 insulates, inf conducts perfectly.
+    text dump, a netCDF or VTK file as ``pack`` writes it, or a file of another DEM code; or a voxel image of
+    labelled phases (.npy, TIFF, raw), of which --phases gives the conductivities. Overlapping inclusions count as
+    their union; where their conductivities differ the radical plane divides them. 0 insulates, inf conducts
+    perfectly.
     """
     start = time.perf_counter()
     import numpy as np
@@ -77,6 +82,15 @@ def homogenize_command(
     for path in (output, plot):
         if path is not None:
             check_place(path, inclusions)
+    if image.asked(inclusions):
+        record = _of_image(inclusions, words, image, plot, given)
+        if output is not None:
+            write_image_result(output, record)
+        record["seconds"] = time.perf_counter() - start
+        (print_json if as_json else _print_table)(record)
+        return
+    if given["matrix"] is None:
+        raise InputError("--matrix is missing: give the conductivity of the matrix [W/(m K)]")
     boundary, engine = given["boundary"], find_engine(given.pop("engine"))
     if engine.needs_contacts:
         raise InputError(f"engine {engine.name} works on contacts: use the command solve")
@@ -107,6 +121,24 @@ def homogenize_command(
         print_json(record)
     else:
         _print_table(record)
+
+
+def _of_image(
+    path: Path, words: SampleWords, image: ImageWords, plot: Path | None, given: dict[str, Any]
+) -> dict[str, Any]:
+    """The record of a voxel image; options that mean nothing to it are refused."""
+    from etc_engine.errors import InputError
+
+    unused = {"--plot": plot, "--crop": words.crop, "--periodic": words.periodic, "--frame": words.frame}
+    unused |= {f"--{name}": given[name] for name in ("method", "resolution", "green", "particles", "seed")}
+    for name, value in unused.items():
+        if value is not None:
+            raise InputError(f"{name} is not valid with a voxel image")
+    if given["engine"] != "voxel":
+        raise InputError(f"a voxel image is solved by --engine voxel, found {given['engine']}")
+    lengths = None if words.box is None else tuple(high - max(low, 0.0) for low, high in parse_faces(words.box))
+    task = ImageTask(lengths, given["boundary"] or "periodic", given["solver"] or "cg", _threads())
+    return image.solve(path, given["matrix"], given["inclusion"], task)
 
 
 def _medium(table: ParticleTable, path: Path, matrix: float, inclusion: float | None) -> Medium:

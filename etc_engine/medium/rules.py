@@ -165,23 +165,38 @@ class Rule:
         (packing, **values) -> ContactNetwork.
     keys : mapping of str to str
         Key of a study -> argument of the function, angles in radians.
+    optional : tuple of str
+        Keys that may be left out.
     dimensions : tuple of int
     """
 
     contacts: Callable[..., ContactNetwork]
     keys: Mapping[str, str]
+    optional: tuple[str, ...] = ()
     dimensions: tuple[int, ...] = (2, 3)
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Keys that a study has to give."""
+        return tuple(key for key in self.keys if key not in self.optional)
 
-ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", "wall_youngs_modulus", "wall_poisson_ratio")}
+
+WALL = ("wall_youngs_modulus", "wall_poisson_ratio")
+ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", *WALL)}
 """Elastic constants of the particles and of the walls, as a study and as a rule spells them."""
 
 RULES: Mapping[str, Rule] = {
     "overlap": Rule(overlap_contacts, {}),
     "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
-    "hertz": Rule(hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}),
-    "load": Rule(load_contacts, {"load": "load", **ELASTIC, "bond_gap": "bond_gap", "coordination": "coordination"}),
+    "hertz": Rule(
+        hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}, (*ELASTIC, "simulated_modulus")
+    ),
+    "load": Rule(
+        load_contacts,
+        {"load": "load", **ELASTIC, "bond_gap": "bond_gap", "coordination": "coordination"},
+        (*WALL, "coordination"),
+    ),
 }
 
 

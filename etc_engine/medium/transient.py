@@ -23,6 +23,26 @@ Flows = Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)
+class HeatSource:
+    """Heat set free at a time, and when its course has a kink.
+
+    Parameters
+    ----------
+    rate : callable
+        t -> heat [W, in 2D W/m].
+    knots : tuple of float [s]
+        Times at which no step may reach across.
+    """
+
+    rate: Callable[[float], NDArray[np.float64]]
+    knots: tuple[float, ...] = ()
+
+    def __call__(self, t: float) -> NDArray[np.float64]:
+        """The heat at a time."""
+        return self.rate(t)
+
+
+@dataclass(frozen=True, eq=False)
 class ParticleSystem:
     """A medium ready to be marched in time.
 
@@ -145,13 +165,13 @@ def particle_capacities(medium: Medium, given: NDArray[np.float64] | None, *, cu
     return np.asarray(medium.heat_capacity * medium.links.cut_measures(prescribed=cut))
 
 
-def state_source(source: Source, count: int, states: int) -> Callable[[float], NDArray[np.float64]]:
+def state_source(source: Source, count: int, states: int) -> HeatSource:
     """Heat set free in each state of each particle at a time."""
 
     def spread(values: ArrayLike) -> NDArray[np.float64]:
         return np.repeat(particle_values(values, count, "source") / states, states)
 
     if callable(source):
-        return lambda t: spread(source(t))
+        return HeatSource(lambda t: spread(source(t)), getattr(source, "knots", ()))
     constant = spread(source)
-    return lambda _: constant
+    return HeatSource(lambda _: constant)

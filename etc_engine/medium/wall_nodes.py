@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix, diags_array
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError
-from etc_engine.medium.walls import WALLS, Convective, FixedTemperature, HeatFlux, WallCondition
+from etc_engine.medium.walls import WALLS, Convective, FixedTemperature, HeatFlux, Insulated, WallCondition
 from etc_engine.solvers.marching import HeatSystem
 
 STIFF_FILM = 1e4
@@ -177,4 +177,15 @@ def heat_system(matrix: csr_matrix, nodes: WallNodes, capacities: NDArray[np.flo
         rates[plates] = np.where(by_film, through_film, into_particles)
         return np.append(rates, source(t).sum())
 
-    return HeatSystem(np.concatenate([np.zeros(nodes.size - nodes.states), capacities]), conductance, load, heat_rates)
+    def source_load(t: float) -> NDArray[np.float64]:
+        return np.concatenate([np.zeros(nodes.size - nodes.states), source(t)])
+
+    knots = {knot for condition in nodes.conditions if not isinstance(condition, Insulated) for knot in condition.knots}
+    return HeatSystem(
+        np.concatenate([np.zeros(nodes.size - nodes.states), capacities]),
+        conductance,
+        load,
+        heat_rates,
+        source_load,
+        tuple(sorted({*knots, *getattr(source, "knots", ())})),
+    )

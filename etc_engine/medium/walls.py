@@ -79,6 +79,17 @@ def as_value(value: ValueLike, name: str) -> Value:
     )
 
 
+def knots_of(value: ValueLike) -> tuple[float, ...]:
+    """Times at which a value has a kink [s]: those of a table.
+
+    Examples
+    --------
+    >>> knots_of(TimeTable((0.0, 2.0), (1.0, 3.0))), knots_of(5.0)
+    ((0.0, 2.0), ())
+    """
+    return value.times if isinstance(value, TimeTable) else ()
+
+
 def value_at(value: Value, t: float) -> float:
     """The value at a time.
 
@@ -104,6 +115,11 @@ class FixedTemperature:
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", as_value(self.value, "wall temperature"))
 
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times at which the temperature has a kink [s]."""
+        return knots_of(self.value)
+
     def temperature(self, t: float) -> float:
         """Wall temperature at a time [K]."""
         return value_at(self.value, t)  # type: ignore[arg-type]
@@ -126,6 +142,11 @@ class HeatFlux:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "value", as_value(self.value, "wall heat flux"))
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times at which the flux has a kink [s]."""
+        return knots_of(self.value)
 
     def flux(self, t: float) -> float:
         """Heat flux into the body at a time [W/m2]."""
@@ -161,6 +182,11 @@ class Convective:
                 f"{self.coefficient:g}; an insulated wall is Insulated()"
             )
         object.__setattr__(self, "ambient", as_value(self.ambient, "ambient temperature"))
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times at which the ambient temperature has a kink [s]."""
+        return knots_of(self.ambient)
 
     def temperature(self, t: float) -> float:
         """Ambient temperature at a time [K]."""

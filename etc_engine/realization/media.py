@@ -7,6 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.laws.roughness import Roughness
+from etc_engine.materials import find_solid
+from etc_engine.medium.conditions import Conditions, pores_at
+from etc_engine.medium.loaded import Stiffness, with_roughness
 from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import find_rule
@@ -41,9 +45,44 @@ def make_media(
     media = []
     for values in spec.combinations():
         network = _network(packing, spec.rule, values, found) if contacts else None
-        conductivity = particle_conductivities(packing.count, values, order)
-        media.append(Medium(packing, conductivity, network, Pores(values.get("pore_conductivity", 0.0))))
+        solid = {} if spec.material is None else {"particle_conductivity": solid_conductivity(spec.material, values)}
+        conductivity = particle_conductivities(packing.count, {**values, **solid}, order)
+        pores = pores_at(conditions_of(spec, values), packing, values.get("pore_conductivity", 0.0))
+        if network is not None and "roughness_height" in values:
+            network = _roughened(network, values, conductivity, pores)
+        media.append(Medium(packing, conductivity, network, pores))
     return media
+
+
+def solid_conductivity(material: str, values: Values) -> float:
+    """Conductivity of a solid by name at the temperature among the values [W/(m K)]."""
+    return float(find_solid(material).conductivity.at(values["temperature"]))
+
+
+def conditions_of(spec: RealizationSpec, values: Values) -> Conditions:
+    """Gas, temperature, pressure and radiation of one medium."""
+    return Conditions(
+        values.get("temperature"),
+        spec.gas,
+        values.get("pressure"),
+        values.get("accommodation"),
+        None if spec.gas is None or spec.material is None else find_solid(spec.material).atomic_mass,
+        values.get("emissivity"),
+    )
+
+
+def _roughened(
+    network: ContactNetwork, values: Values, conductivity: NDArray[np.float64], pores: Pores
+) -> ContactNetwork:
+    """The contacts with the area resistance of rough surfaces."""
+    roughness = Roughness(values["roughness_height"], values["roughness_slope"], hardness=values["roughness_hardness"])
+    stiffness = Stiffness(
+        values["youngs_modulus"],
+        values["poisson_ratio"],
+        values.get("wall_youngs_modulus"),
+        values.get("wall_poisson_ratio"),
+    )
+    return with_roughness(network, roughness, stiffness, conductivity, (pores.conductivity, pores.jump_length))
 
 
 def contact_network(packing: ParticlePacking, word: str, values: Values) -> ContactNetwork:
@@ -65,13 +104,13 @@ def _network(
 ) -> ContactNetwork:
     """Contacts for some values; ``found`` holds those that were made before."""
     rule = find_rule(word)
-    own = {key: values[key] for key in rule.keys}
+    own = {key: values[key] for key in rule.keys if key in values}
     resistance, angle = values.get("contact_resistance", 0.0), own.get("contact_angle", 0.0)
     whole = (*own.values(), resistance)
     if whole not in found:
         pairs = tuple(value for key, value in own.items() if key != "contact_angle")
         if pairs not in found:
-            found[pairs] = rule.contacts(packing, **{argument: own[key] for key, argument in rule.keys.items()})
+            found[pairs] = rule.contacts(packing, **{rule.keys[key]: value for key, value in own.items()})
         network = found[pairs]
         if "contact_angle" in own:
             network = network.with_half_angle(angle)

@@ -25,6 +25,10 @@ class RealizationSpec:
         Physical values in SI units (angles in radians), by the names of `etc_engine.study.quantities.QUANTITIES`.
     axes : mapping of str to tuple of float
         Those of which there are several; each combination is a medium, the last axis running fastest.
+    material : str, optional
+        Solid of the particles by name: its conductivity at ``temperature`` takes the place of a number.
+    gas : str or mapping, optional
+        What fills the pores, by name or mole fractions, see `etc_engine.materials.gas_state`.
     """
 
     packing: PackingSpec
@@ -32,6 +36,8 @@ class RealizationSpec:
     conduction: tuple[Conduction, ...] = (Conduction(),)
     values: Mapping[str, float] = field(default_factory=dict)
     axes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    material: str | None = None
+    gas: str | Mapping[str, float] | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -109,9 +109,10 @@ def march(
     scheme : str
         A name of `SCHEMES`.
     step : float, optional [s]
-        Largest step; each output interval is divided into equal ones. For ``adaptive``, the first step to try.
+        Largest step; each output interval is divided into equal ones, between the knots of the system. For
+        ``adaptive``, the first step to try.
     steps : int, optional
-        Steps of each output interval, instead of ``step``.
+        Steps of each output interval, instead of ``step``; a knot inside may add some.
     tolerance : float [K]
         Largest estimated error of an ``adaptive`` step at any node.
     solver_tolerance : float
@@ -172,12 +173,26 @@ def march(
     for low, high in pairwise(times):
         if low < state.time:
             continue
-        if scheme == "adaptive":
-            state = _adapt(run, state, low, high, step)
-        else:
-            count = steps if steps is not None else int(np.ceil((high - low) / float(step or 1.0) * (1.0 - 1e-12)))
-            state = _divide(run, state, low, high, max(count, 1))
+        longest = (high - low) / steps if steps is not None else float(step or 1.0)
+        for begin, end in pairwise(_split_at_knots(system.knots, low, high)):
+            if scheme == "adaptive":
+                state = _adapt(run, state, begin, end, step)
+                continue
+            if begin in system.knots:  # what came before does not continue: begin anew
+                state = replace(state, step=0.0)
+            count = int(np.ceil((end - begin) / longest * (1.0 - 1e-12)))
+            state = _divide(run, state, begin, end, max(count, 1))
         yield state
+
+
+def _split_at_knots(knots: Sequence[float], low: float, high: float) -> list[float]:
+    """Ends of an output interval with the knots inside, those closer than round-off to one before left out."""
+    least = 1e-12 * (high - low)
+    ends = [low]
+    for knot in sorted(knots):
+        if ends[-1] + least < knot < high - least:
+            ends.append(float(knot))
+    return [*ends, high]
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +280,7 @@ def _adapt(run: _Run, state: MarchState, low: float, high: float, first: float |
     """March over an output interval in steps that are the interval halved ``level`` times, position by position."""
     whole = high - low
     wanted = state.step or first or _first_step(run, low, state)
-    level = int(np.clip(np.ceil(np.log2(whole / wanted) - 1e-9), 0, MOST_HALVINGS))
+    level = 0 if wanted >= whole else min(int(np.ceil(np.log2(whole / wanted) - 1e-9)), MOST_HALVINGS)
     position = 0
     while position < 2**level:
         h = _rounded(whole / 2**level)

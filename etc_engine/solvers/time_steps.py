@@ -44,6 +44,11 @@ class HeatSystem:
     heat_rates : callable, optional
         (t, T) -> heat flows into the system, shape (k,) [W], say at each wall and from the sources. They should add
         up to 1 . (f - K T), which is the one flow taken by default.
+    source : callable, optional
+        t -> part of f(t) that is set free at nodes with a capacity, shape (n,) [W]. The last heat rate is its sum.
+        Schemes of order 1 take it in the middle of a step, so that they too integrate exactly what is linear in time.
+    knots : tuple of float [s]
+        Times at which f has a kink or jumps: no step reaches across one.
 
     Raises
     ------
@@ -55,6 +60,8 @@ class HeatSystem:
     conductance: csr_matrix
     load: Callable[[float], Vector]
     heat_rates: Callable[[float, Vector], Vector] | None = None
+    source: Callable[[float], Vector] | None = None
+    knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         n = self.capacity.size
@@ -81,6 +88,16 @@ class HeatSystem:
         if self.heat_rates is None:
             return np.array([(self.load(t) - self.conductance @ temperatures).sum()])
         return np.asarray(self.heat_rates(t, temperatures), dtype=np.float64)
+
+
+def _centred(system: HeatSystem, at: float, middle: float, rates: Vector) -> tuple[Vector | float, Vector]:
+    """What the source in the middle of a step adds to the load at a time of it, and the heat rates with it."""
+    if system.source is None:
+        return 0.0, rates
+    change = system.source(middle) - system.source(at)
+    centred = rates.copy()
+    centred[-1] += change.sum()
+    return change, centred
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,17 +160,26 @@ def algebraic_rows(system: HeatSystem, tolerance: float) -> AlgebraicRows:
 
 
 def explicit_euler(system: HeatSystem, algebraic: AlgebraicRows, t: float, h: float, old: Vector) -> Step:
-    """C (T' - T) = h (f - K T), the algebraic rows solved at the end; flows by the rectangle at the start."""
+    """C (T' - T) = h (f - K T), the algebraic rows solved at the end; flows by the rectangle at the start.
+
+    The source is taken in the middle.
+    """
     stores = system.stores
+    change, rates = _centred(system, t, t + 0.5 * h, system.rates(t, old))
     new = old.copy()
-    new[stores] += h * system.slope(t, old)[stores] / system.capacity[stores]
-    return Step(algebraic.fit(system, t + h, new), h * system.rates(t, old), int(algebraic.rows.size > 0))
+    new[stores] += h * (system.slope(t, old) + change)[stores] / system.capacity[stores]
+    return Step(algebraic.fit(system, t + h, new), h * rates, int(algebraic.rows.size > 0))
 
 
 def backward_euler(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector) -> Step:
-    """(C/h + K) T' = C/h T + f(t + h); flows by the rectangle at the end. The matrix has the rate 1/h."""
-    new, iterations = matrix.solve(system.capacity * old * matrix.rate + system.load(t + h), old)
-    return Step(new, h * system.rates(t + h, new), iterations)
+    """(C/h + K) T' = C/h T + f(t + h); flows by the rectangle at the end. The matrix has the rate 1/h.
+
+    The source is taken in the middle.
+    """
+    change, _ = _centred(system, t + h, t + 0.5 * h, np.zeros(1))
+    new, iterations = matrix.solve(system.capacity * old * matrix.rate + system.load(t + h) + change, old)
+    _, rates = _centred(system, t + h, t + 0.5 * h, system.rates(t + h, new))
+    return Step(new, h * rates, iterations)
 
 
 def crank_nicolson(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector) -> Step:

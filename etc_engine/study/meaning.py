@@ -16,6 +16,9 @@ Needs = Mapping[str, tuple[str, ...]]
 NOT_SWEPT = ("dipoles", "threads")
 """Options of engines that a sweep has no use for: those of a transient, and of the machine."""
 
+NONE = ""
+"""The word of a choice that is left out."""
+
 OPTIONS = {
     name: option for engine in ENGINES.values() for name, option in engine.options.items() if name not in NOT_SWEPT
 }
@@ -29,6 +32,9 @@ def _meanings() -> Iterator[tuple[str, Needs]]:
     for key in (row.key for row in QUANTITIES.values() if row.table == "contacts"):
         rules = {"contacts.rule": tuple(word for word, rule in RULES.items() if key in rule.keys)}
         yield f"contacts.{key}", {**networks, **(rules if key in of_rules else {})}
+    yield "contacts.roughness", {**networks, "contacts.rule": ("hertz", "load")}
+    yield "particles.conductivity", {"particles.material": (NONE,)}
+    yield "pores.conductivity", {"pores.gas": (NONE,)}
     for name in OPTIONS:
         methods = [(e, m) for e, engine in ENGINES.items() for m, row in engine.methods.items() if name in row.options]
         engines, words = (tuple(dict.fromkeys(column)) for column in zip(*methods, strict=True))
@@ -48,7 +54,7 @@ def chosen(study: StudyTable, place: str) -> tuple[str, ...]:
         return tuple(found.methods)
     for key in place.split("."):
         found = getattr(found, key)
-    return (found,)
+    return (NONE,) if found is None else (found if isinstance(found, str) else "a mixture",)
 
 
 def meaningless(study: StudyTable) -> Iterator[tuple[str, str]]:

@@ -27,6 +27,10 @@ from etc_engine.study.schema import (
 
 Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+SHARE = "a number from 0 to 1"
+Accommodation = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
+Poisson = Annotated[float, Field(strict=True, gt=-1.0, le=0.5)]
+POISSON = "a number above -1, up to 0.5"
 T = TypeVar("T", bound="QuantityTable")
 
 
@@ -52,6 +56,8 @@ class Quantity:
         None where the study need not give a value.
     si : float
         Factor from the unit of the study file to that of the engine.
+    plane : str
+        Units of disks, per unit thickness, where they are others than those of spheres.
     """
 
     place: str
@@ -64,6 +70,7 @@ class Quantity:
     default: float | None = None
     comment: str = ""
     si: float = 1.0
+    plane: str = ""
 
     @property
     def table(self) -> str:
@@ -75,10 +82,10 @@ class Quantity:
         """The key in its table."""
         return self.place.rpartition(".")[2]
 
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Attributes of the dimension in the result."""
-        found = {"long_name": self.long_name, "units": self.units, "comment": self.comment}
+    def attributes(self, dimension: int) -> dict[str, str]:
+        """Attributes of the dimension in a result of disks (2) or spheres (3)."""
+        units = self.plane if self.plane and dimension == 2 else self.units
+        found = {"long_name": self.long_name, "units": units, "comment": self.comment}
         return {key: value for key, value in found.items() if value}
 
     def field(self) -> tuple[Any, Any]:
@@ -86,7 +93,8 @@ class Quantity:
         check: Any = self.check
         several: Any = Annotated[tuple[check, ...], AfterValidator(_ascending), Field(min_length=1)]
         one_or_several: Any = Annotated[Annotated[check, Tag(AS_NUMBER)] | Annotated[several, Tag(AS_LIST)], WRITTEN]
-        units = "" if self.units == "1" else f" [{self.units}]"
+        plane = f", of disks {readable(self.plane)}" if self.plane else ""
+        units = "" if self.units == "1" else f" [{readable(self.units)}{plane}]"
         described = f"{self.allowed}{units}, or a list of different ones"
         required = self.default is None and self.table.count(".") > 0  # a table in a table says all of it
         return (
@@ -131,7 +139,54 @@ QUANTITIES: Mapping[str, Quantity] = {
             NotNegative,
             NOT_NEGATIVE,
             default=0.0,
-            comment="of disks per unit thickness, m K W-1",
+            plane="m K W-1",
+        ),
+        Quantity(
+            "contacts.youngs_modulus",
+            "Pa",
+            "Young's modulus of the particles",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.poisson_ratio", "1", "Poisson's ratio of the particles", "contacts", Poisson, POISSON),
+        Quantity("contacts.wall_youngs_modulus", "Pa", "Young's modulus of the walls", "contacts", Positive, POSITIVE),
+        Quantity("contacts.wall_poisson_ratio", "1", "Poisson's ratio of the walls", "contacts", Poisson, POISSON),
+        Quantity(
+            "contacts.simulated_modulus",
+            "Pa",
+            "Young's modulus of the run that made the overlaps",
+            "contacts",
+            Positive,
+            POSITIVE,
+        ),
+        Quantity("contacts.load", "Pa", "mean stress that the contacts carry", "contacts", Positive, POSITIVE),
+        Quantity(
+            "contacts.roughness.height",
+            "m",
+            "rms roughness height, of both surfaces together",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_height",
+        ),
+        Quantity(
+            "contacts.roughness.slope",
+            "1",
+            "rms roughness slope, of both surfaces together",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_slope",
+        ),
+        Quantity(
+            "contacts.roughness.hardness",
+            "Pa",
+            "micro-hardness of the softer surface",
+            "medium",
+            Positive,
+            POSITIVE,
+            name="roughness_hardness",
         ),
         Quantity(
             "particles.conductivity",
@@ -158,7 +213,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             "number fraction of the particles of the second material",
             "medium",
             Share,
-            "a number from 0 to 1",
+            SHARE,
             name="mixture_fraction",
         ),
         Quantity(
@@ -171,6 +226,17 @@ QUANTITIES: Mapping[str, Quantity] = {
             name="pore_conductivity",
             default=0.0,
         ),
+        Quantity("pores.pressure", "Pa", "pressure of the gas", "medium", NotNegative, NOT_NEGATIVE),
+        Quantity(
+            "pores.accommodation",
+            "1",
+            "thermal accommodation coefficient of the surfaces",
+            "medium",
+            Accommodation,
+            "a number above 0, up to 1",
+        ),
+        Quantity("radiation.emissivity", "1", "emissivity of the particles", "medium", Share, SHARE),
+        Quantity("conduction.temperature", "K", "temperature", "medium", Positive, POSITIVE),
     )
 }
 """The rows by the names of their dimensions, in the order of the dimensions of a result."""
@@ -231,21 +297,31 @@ def word_of(name: str, value: Any) -> str:
     return f"{name.replace('_', ' ')} {value:.4g}"
 
 
-def heading_of(name: str) -> str:
-    """The heading of a column or an axis that holds a dimension.
+def heading_of(name: str, attributes: Mapping[str, str]) -> str:
+    """The heading of a column or an axis that holds a dimension with these attributes.
 
     Examples
     --------
-    >>> heading_of("contact_angle"), heading_of("particle_conductivity"), heading_of("density")
-    ('contact half-angle [degree]', 'conductivity of the particles [W/(m K)]', 'density')
+    >>> heading_of("contact_resistance", QUANTITIES["contact_resistance"].attributes(2))
+    'thermal resistance of a contact [m K/W]'
+    >>> heading_of("density", QUANTITIES["density"].attributes(2)), heading_of("method", {})
+    ('density', 'method')
     """
-    row = QUANTITIES.get(name)
-    if row is None:
-        return name
-    if row.units == "1":
-        return row.long_name
-    return f"{row.long_name} [{READABLE.get(row.units, row.units)}]"
+    units = attributes.get("units", "1")
+    return attributes.get("long_name", name) + ("" if units == "1" else f" [{readable(units)}]")
 
 
-READABLE = {"W m-1 K-1": "W/(m K)", "K W-1": "K/W"}
-"""Units as they are written for readers."""
+def readable(units: str) -> str:
+    """Units as they are written for readers.
+
+    Examples
+    --------
+    >>> readable("W m-1 K-1"), readable("m K W-1"), readable("Pa")
+    ('W/(m K)', 'm K/W', 'Pa')
+    """
+    above = [word for word in units.split() if "-" not in word]
+    below = [word.replace("-1", "").replace("-", "") for word in units.split() if "-" in word]
+    if not below:
+        return units
+    under = below[0] if len(below) == 1 else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{under}"

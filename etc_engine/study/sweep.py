@@ -13,6 +13,7 @@ from etc_engine.engines.voxel.voxelization import check_memory, coarsest_resolut
 from etc_engine.errors import InputError
 from etc_engine.medium.rules import RULES
 from etc_engine.realization import ENGINES, Conduction, RealizationSpec
+from etc_engine.study.conditions import check_conditions
 from etc_engine.study.files import A_SEED, SCHEMA, Seed, StudyFile, parse_toml, read_text, validated
 from etc_engine.study.meaning import MEANING, OPTIONS, drop_meaningless, meaningless, refuse_meaningless
 from etc_engine.study.quantities import QUANTITIES, value_of
@@ -61,10 +62,11 @@ class Study(StudyFile):
                     f"packing.box: method {method!r} of engine {engine.name!r} works in {works}, found "
                     f"{list(self.packing.box)}"
                 )
-            self._check_pores(method, row.pores)
+            self._check_pores(method)
         if dimension not in RULES[self.contacts.rule].dimensions:
             raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
         refuse_meaningless(self)
+        check_conditions(self)
         if not engine.needs_contacts:
             self._check_cell()
         densest = max((density for density in self.densities if density is not None), default=0.0)
@@ -74,16 +76,28 @@ class Study(StudyFile):
             )
         return self
 
-    def _check_pores(self, method: str, pores: str) -> None:
+    def _check_pores(self, method: str) -> None:
         """Refuse pores that conduct with a method that leaves their heat out, and the reverse."""
-        values, which = self.values("pore_conductivity"), f"method {method!r} of engine {self.conduction.engine!r}"
-        if pores == "no" and max(values) > 0.0:
+        row, (some, every) = ENGINES[self.conduction.engine].methods[method], self.pores_conduct
+        which = f"method {method!r} of engine {self.conduction.engine!r}"
+        if row.pores == "no" and some:
+            values = self.values("pore_conductivity")
+            if self.pores.gas is None and max(values) > 0.0:
+                raise ValueError(
+                    f"pores.conductivity: found {max(values):g}, {which} takes no heat through them: allowed is 0"
+                )
+            key = "radiation.emissivity" if self.pores.gas is None else "pores.gas"
+            raise ValueError(f"{key}: {which} takes no heat through the pores, take it out")
+        if row.pores == "must" and not every:
+            key = "pore_conductivity" if self.pores.gas is None else "pressure"
             raise ValueError(
-                f"pores.conductivity: found {max(values):g}, {which} takes no heat through them: allowed is 0"
+                f"{QUANTITIES[key].place}: found {min(self.values(key)):g}, {which} is only valid with pores that "
+                "conduct"
             )
-        if pores == "must" and min(values) <= 0.0:
+        if self.pores_rarefied and not row.gas:
             raise ValueError(
-                f"pores.conductivity: found {min(values):g}, {which} is only valid with pores that conduct"
+                f"conduction.method: {which} takes neither a rarefied gas nor radiation: with it leave out "
+                "radiation.emissivity, pores.accommodation and, beside a gas, particles.material"
             )
 
     def _check_cell(self) -> None:
@@ -127,12 +141,25 @@ class Study(StudyFile):
         """The methods as a list, one or many."""
         method = self.conduction.method
         if method is None:
-            engine, conduct = ENGINES[self.conduction.engine], max(self.values("pore_conductivity")) > 0.0
+            engine = ENGINES[self.conduction.engine]
             try:
-                return (engine.default_method(len(self.packing.box), conduct),)
+                return (engine.default_method(len(self.packing.box), self.pores_conduct[0]),)
             except InputError:  # none fits: the checks say what is wrong with the first
                 return (next(iter(engine.methods)),)
         return (method,) if isinstance(method, str) else method
+
+    @property
+    def pores_conduct(self) -> tuple[bool, bool]:
+        """Whether heat goes through the pores: with some of the values, with all of them."""
+        glow = self.values("emissivity") or (0.0,)
+        held = self.values("pore_conductivity" if self.pores.gas is None else "pressure") or (0.0,)
+        return max(glow) > 0.0 or max(held) > 0.0, min(glow) > 0.0 or min(held) > 0.0
+
+    @property
+    def pores_rarefied(self) -> bool:
+        """Whether surfaces radiate, or the gas has temperature jumps."""
+        jumps = self.pores.accommodation is not None or self.particles.material is not None
+        return max(self.values("emissivity"), default=0.0) > 0.0 or (self.pores.gas is not None and jumps)
 
     def values(self, name: str) -> tuple[float, ...]:
         """Values of a quantity, one or several; none where the study does not give any."""
@@ -182,14 +209,17 @@ class Study(StudyFile):
 
     def realization_spec(self, density: float | None) -> RealizationSpec:
         """The specification of one realization at a density of this study (None: the packer's own)."""
-        rows, engine = QUANTITIES, ENGINES[self.conduction.engine]
+        rows = QUANTITIES
+        growth = self.contacts.rule in ("overlap", "hertz") and ENGINES[self.conduction.engine].needs_contacts
         si = {name: tuple(value * rows[name].si for value in values) for name, values in self.quantities.items()}
         return RealizationSpec(
-            packing=self.packing.spec(density, radius_growth=self.contacts.rule == "overlap" and engine.needs_contacts),
+            packing=self.packing.spec(density, radius_growth=growth),
             rule=self.contacts.rule,
             conduction=tuple(self._conduction(method) for method in self.methods),
             values={name: values[0] for name, values in si.items() if name not in self.axes},
             axes={name: values for name, values in si.items() if name in self.axes},
+            material=self.particles.material,
+            gas=self.pores.gas,
         )
 
     def _conduction(self, method: str) -> Conduction:
@@ -234,7 +264,7 @@ def study_schema() -> dict[str, Any]:
     --------
     >>> keys = study_schema()["$defs"]["ContactsTable"]["properties"]
     >>> keys["coordination"]["x-with"]["contacts.rule"]
-    ['coordination']
+    ['coordination', 'load']
     """
     found = Study.model_json_schema()
     tables = {key: node["$ref"].rpartition("/")[2] for key, node in found["properties"].items() if "$ref" in node}

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, WithJsonSchema, create_model, model_
 
 from etc_engine.box import Box, parse_periodic
 from etc_engine.errors import InputError
+from etc_engine.materials import find_solid
 from etc_engine.medium.rules import RULES
 from etc_engine.models.catalogue import find_model
 from etc_engine.packing import PackingSpec, RadiusDistribution, parse_radii
@@ -34,6 +35,13 @@ def _known_rule(word: str) -> str:
     if word not in RULES:
         raise ValueError(f"found {word!r}, allowed: {', '.join(RULES)}")
     return word
+
+
+def _known_solid(word: str) -> str:
+    try:
+        return find_solid(word).name
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 def with_options(cls: type[T]) -> type[T]:
@@ -111,6 +119,11 @@ class PackingTable(QuantityTable):
         )
 
 
+@with_quantities("contacts.roughness")
+class RoughnessTable(QuantityTable):
+    """``roughness`` of ``[contacts]``: rough surfaces, which conduct through asperities."""
+
+
 @with_quantities("contacts")
 class ContactsTable(QuantityTable):
     """``[contacts]``: which pairs conduct, and how well."""
@@ -118,12 +131,19 @@ class ContactsTable(QuantityTable):
     rule: Annotated[Word, AfterValidator(_known_rule)] = Field(
         default="overlap", description="the word of a contact rule", json_schema_extra={"enum": list(RULES)}
     )
+    roughness: RoughnessTable | None = Field(
+        default=None, description="a table such as { height = 1e-6, slope = 0.1, hardness = 4e9 }"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> ContactsTable:
-        for key in RULES[self.rule].keys:
+        needs = dict.fromkeys(RULES[self.rule].needs, f"rule = {self.rule!r}")
+        for choice in ("simulated_modulus", "roughness"):
+            if getattr(self, choice) is not None:
+                needs |= dict.fromkeys(("youngs_modulus", "poisson_ratio"), choice)
+        for key, choice in needs.items():
             if getattr(self, key) is None:
-                raise ValueError(f"rule = {self.rule!r} needs {key}, {QUANTITIES[key].allowed}")
+                raise ValueError(f"{choice} needs {key}, {QUANTITIES[key].allowed}")
         return self
 
     def values(self) -> dict[str, float]:
@@ -142,6 +162,9 @@ class MixtureTable(QuantityTable):
 class ParticlesTable(QuantityTable):
     """``[particles]``: what they are made of."""
 
+    material: Annotated[Word, AfterValidator(_known_solid)] | None = Field(
+        default=None, description="a solid by the name that the command `materials` prints"
+    )
     mixture: MixtureTable | None = Field(
         default=None, description="a table such as { conductivity = 10.0, fraction = 0.3 }"
     )
@@ -150,6 +173,10 @@ class ParticlesTable(QuantityTable):
 @with_quantities("pores")
 class PoresTable(QuantityTable):
     """``[pores]``: what fills them."""
+
+    gas: Annotated[Word | dict[Word, Positive], WithJsonSchema({"type": "string"})] | None = Field(
+        default=None, description="a gas by name, such as 'helium', or a table of mole fractions"
+    )
 
 
 @with_quantities("radiation")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from etc_engine.durable.files import replacing
 from etc_engine.errors import OutputError
 from etc_engine.realization import Status
+from etc_engine.study.conditions import derived_conductivities
 from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.statistics import summarize
@@ -34,6 +35,7 @@ STATISTICS = {
     "ci_low": "lower end of the confidence interval of the mean conductivity",
     "ci_high": "upper end of the confidence interval of the mean conductivity",
 }
+DERIVED = "of the material, or of the gas as a continuum, at the temperature and pressure"
 STREAM_COMMENT = (
     "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
     "of the density as a double (NaN: the packer's own); stored is generate_state(1, uint64) of the sequence"
@@ -101,7 +103,10 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
     }
     for name, values in study.quantities.items():
         several = name in study.axes
-        found[name] = (name if several else (), np.array(values if several else values[0]), QUANTITIES[name].attributes)
+        attributes = QUANTITIES[name].attributes(study.box.dimension)
+        found[name] = (name if several else (), np.array(values if several else values[0]), attributes)
+    for name, (dims, derived) in derived_conductivities(study).items():
+        found[name] = (dims, derived, {**QUANTITIES[name].attributes(study.box.dimension), "comment": DERIVED})
     return found
 
 

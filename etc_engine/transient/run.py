@@ -15,8 +15,8 @@ from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
-from etc_engine.medium.transient import ParticleSystem
-from etc_engine.medium.walls import value_at
+from etc_engine.medium.transient import HeatSource, ParticleSystem
+from etc_engine.medium.walls import knots_of, value_at
 from etc_engine.packing import ParticlePacking, pack
 from etc_engine.particle_files.dumps import read_trajectory
 from etc_engine.particle_files.formats import format_to_read, read_particles
@@ -176,8 +176,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
         raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
-    if first.dimension != 2 or first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, 2):
-        raise StudyError(f"packing.files: expected disks in a box periodic along {file.periodic!r}, found {first.box}")
+    if first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, first.dimension):
+        raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
 
     def contacts(packing: ParticlePacking) -> ContactNetwork:
@@ -240,6 +240,10 @@ def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None
 def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
     initial = study.particles.initial
     if isinstance(initial, Gradient):
+        if len(initial.gradient) != packing.dimension:
+            raise StudyError(
+                f"particles.initial.gradient: expected {packing.dimension} numbers, found {len(initial.gradient)}"
+            )
         return np.asarray(initial.value + packing.centers @ np.array(initial.gradient))
     return initial
 
@@ -259,7 +263,7 @@ def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDAr
         path = folder / words.files
         if not path.exists():
             raise StudyError(f"packing.files: there is no file {path}")
-        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", 2))
+        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", len(words.box)))
         if box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
         table = read_particles(path, box, None if words.frames == "last" else words.frames)
@@ -272,7 +276,7 @@ def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
     return contact_network(packing, study.contacts.rule, study.contacts.values())
 
 
-def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.float64]]:
+def _source(study: NetworkStudy, count: int) -> HeatSource:
     """Heat set free in each particle at a time; sources on one particle add up."""
     parts = []
     for k, source in enumerate(study.source):
@@ -284,7 +288,7 @@ def _source(study: NetworkStudy, count: int) -> Callable[[float], NDArray[np.flo
     def heat(t: float) -> NDArray[np.float64]:
         return sum((share * value_at(value, t) for share, value in parts), np.zeros(count))
 
-    return heat
+    return HeatSource(heat, tuple(sorted({knot for _, value in parts for knot in knots_of(value)})))
 
 
 def _digest(study: NetworkStudy, course: _Course) -> str:

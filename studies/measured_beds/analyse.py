@@ -1,4 +1,4 @@
-"""Measured beds beside computed ones: ``python analyse.py beds figure.png results.csv``
+"""Measured beds beside computed ones: ``python analyse.py beds results.csv``; ``plot.py`` draws them.
 
 Every point is computed on the beds of ``make_beds.py``: with the best estimate of the assumed inputs, and a band
 between the ends of their ranges, each end on the side where it lowers or raises the conductivity. Nothing is fitted.
@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from bed import Bed, Conditions
-from matplotlib.figure import Figure
 from sets import Measured, Point, read, titanate
 
 HERE = Path(__file__).parent
@@ -76,16 +75,14 @@ def sensitivities(measured: Measured, bed: Bed) -> dict[str, float]:
     return found
 
 
-def main(folder: str, picture: str, table: str) -> None:
+def main(folder: str, table: str) -> None:
     beds = sorted((Bed(path) for path in sorted(Path(folder).glob("*.dump"))), key=lambda bed: bed.density)
     print("beds:", ", ".join(f"{bed.density:.3f} (Z = {bed.coordination:.2f})" for bed in beds))
     sets = read(HERE / "measured.csv")
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    axes = figure.subplots(3, 3).ravel()
     with Path(table).open("w", newline="", encoding="utf-8") as file:
         out = csv.writer(file, lineterminator="\n")
         out.writerow(["set", "temperature", "pressure", "contrast", "gas", "measured", "low", "computed", "high"])
-        for measured, panel in zip(sets, axes, strict=False):
+        for measured in sets:
             rows = [compute(measured, point, beds) for point in measured.points]
             for point, (low, best, high) in zip(measured.points, rows, strict=True):
                 values = [point.temperature, point.pressure, point.contrast, point.gas, point.measured]
@@ -99,10 +96,6 @@ def main(folder: str, picture: str, table: str) -> None:
                     ]
                 )
             _summary(measured, rows, sensitivities(measured, beds[len(beds) // 2]))
-            _draw(panel, measured, rows)
-    for panel in axes[len(sets) :]:
-        panel.set_axis_off()
-    figure.savefig(picture, dpi=130)
 
 
 def _summary(measured: Measured, rows: list[tuple[float, float, float]], slopes: dict[str, float]) -> None:
@@ -114,27 +107,6 @@ def _summary(measured: Measured, rows: list[tuple[float, float, float]], slopes:
         f"{100 * off.min():+.0f} to {100 * off.max():+.0f} %; d ln k/d ln x: "
         + ", ".join(f"{name} {value:+.2f}" for name, value in slopes.items())
     )
-
-
-def _draw(panel, measured: Measured, rows: list[tuple[float, float, float]]) -> None:  # type: ignore[no-untyped-def]
-    name = (
-        "contrast" if measured.key == "dimensionless" else "pressure" if "pressure" in measured.key else "temperature"
-    )
-    x = np.array(
-        [getattr(point, name) if getattr(point, name) is not None else i for i, point in enumerate(measured.points)]
-    )
-    order = np.argsort(x, kind="stable")
-    low, best, high = np.array(rows)[order].T
-    panel.fill_between(x[order], low, high, color="tab:blue", alpha=0.2, lw=0)
-    panel.plot(x[order], best, color="tab:blue", marker="." if len(x) < 3 else "")
-    panel.plot(x, [point.measured for point in measured.points], "k.", ms=4)
-    if name in ("contrast", "pressure"):
-        panel.set_xscale("log")
-    if name == "contrast":
-        panel.set_yscale("log")
-    panel.set_title(measured.title, fontsize=7)
-    panel.set_xlabel({"contrast": "$k_s/k_f$", "pressure": "p [Pa]", "temperature": "T [K]"}[name], fontsize=7)
-    panel.tick_params(labelsize=7)
 
 
 if __name__ == "__main__":

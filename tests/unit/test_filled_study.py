@@ -60,7 +60,11 @@ SPEC = RealizationSpec(
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('engine = "voxel"', "", "pores.conductivity: found 0.5, method 'chord' of engine 'dtem' takes no heat"),
+        (
+            'engine = "voxel"',
+            'method = "chord"',
+            "conductivity: found 0.5, method 'chord' of engine 'dtem' takes no heat",
+        ),
         ('engine = "voxel"', 'engine = "pipe"', "method 'chord' of engine 'pipe' takes no heat"),
         ('engine = "voxel"', 'engine = ["voxel"]', r"conduction.engine: found \['voxel'\], allowed"),
         ("resolution = 32", "resolution = 1", "conduction.resolution: found 1, allowed: a whole number of at least"),

@@ -113,9 +113,25 @@ class Resistances(NamedTuple):
     moments: NDArray[np.float64]
 
 
+LARGEST_ELEMENT = 2000
+"""Rows of the matrix of one particle (contacts times modes): its factor costs their cube, ten seconds at this size."""
+
+
 def packed_starts(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Where each square matrix begins in a packed array, for elements of ``offsets[p + 1] - offsets[p]`` rows."""
-    return np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])
+    """Where each square matrix begins in a packed array, for elements of ``offsets[p + 1] - offsets[p]`` rows.
+
+    Raises
+    ------
+    GeometryError
+        If a particle has more rows than an element is solved with.
+    """
+    sizes = np.diff(offsets)
+    if sizes.max(initial=0) > LARGEST_ELEMENT:
+        raise GeometryError(
+            f"particle {int(sizes.argmax())} has {sizes.max()} contacts (times modes), an element of more than "
+            f"{LARGEST_ELEMENT} is not solved: its cost grows with their cube; use the engine pipe"
+        )
+    return np.concatenate([[0], np.cumsum(sizes**2)])
 
 
 def condensed_elements(resistances: Resistances, sides: ContactSides) -> Elements:

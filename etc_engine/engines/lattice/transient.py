@@ -11,7 +11,7 @@ from etc_engine.engines.lattice.body import SURFACE
 from etc_engine.engines.lattice.network import Conductances, Lattice
 from etc_engine.errors import InputError
 from etc_engine.medium.links import laplacian
-from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, WallCondition
+from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux, Insulated, WallCondition
 from etc_engine.solvers.marching import HeatSystem
 
 
@@ -106,7 +106,8 @@ def heat_system(
             flows.append(float((given - taken * temperatures[lattice.wall_particles[links[wall]]]).sum()))
         return np.array([*flows, float(heat.sum())])
 
-    return HeatSystem(lattice.volumes * capacity, matrix, load, heat_rates)
+    knots = {knot for c in walls.values() if not isinstance(c, Insulated) for knot in c.knots}
+    return HeatSystem(lattice.volumes * capacity, matrix, load, heat_rates, knots=tuple(sorted(knots)))
 
 
 def safe_step(lattice: Lattice, system: HeatSystem) -> float:

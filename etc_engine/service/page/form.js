@@ -62,7 +62,7 @@ function meant(field, values, fields) {
   return Object.entries(field.needs).every(([choice, words]) => {
     const asked = fields.find(other => other.place === choice);
     const chosen = values[choice].split(",").map(word => word.trim()).filter(Boolean);
-    return (chosen.length ? chosen : (wordsOf(asked, values) || []).slice(0, 1)).some(word => words.includes(word));
+    return (chosen.length ? chosen : (wordsOf(asked, values) || [""]).slice(0, 1)).some(word => words.includes(word));
   });
 }
 

@@ -1,0 +1,82 @@
+"""Solid, gas and radiation of a study: what they need, and the conductivities that follow from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from etc_engine.errors import InputError
+from etc_engine.materials import find_solid, gas_state
+from etc_engine.medium.conditions import Conditions
+
+if TYPE_CHECKING:
+    from etc_engine.study.sweep import Study
+
+Derived = dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]
+
+
+def check_conditions(study: Study) -> None:
+    """Refuse a gas, a solid or radiation without what it needs, and what is out of the range of its data.
+
+    Raises
+    ------
+    ValueError
+    """
+    first = {name: next(iter(study.values(name)), None) for name in ("temperature", "pressure", "accommodation")}
+    glow = max(study.values("emissivity"), default=0.0)
+    try:
+        Conditions(first["temperature"], study.pores.gas, first["pressure"], first["accommodation"], None, glow)
+    except InputError as error:
+        raise ValueError(f"pores: {error}") from None
+    if study.particles.material is not None and first["temperature"] is None:
+        raise ValueError("conduction.temperature: missing, the conductivity of particles.material depends on it")
+    if first["temperature"] is not None and not (study.particles.material or study.pores.gas or glow):
+        raise ValueError("conduction.temperature: has no meaning without a material, a gas or radiation, take it out")
+    derived_conductivities(study)
+
+
+def derived_conductivities(study: Study) -> Derived:
+    """Conductivities of particles and pores that follow from a solid and a gas by name [W/(m K)].
+
+    Returns
+    -------
+    dict
+        ``particle_conductivity`` and ``pore_conductivity`` where they follow: dimensions (of temperature and pressure
+        those with a list) and values. Of a gas that of the continuum; 0 without any.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, or a value lies out of the range of the data.
+    """
+    found: Derived = {}
+    if study.particles.material is not None:
+        solid = find_solid(study.particles.material)
+        found["particle_conductivity"] = _over(
+            study, "particles.material", ("temperature",), lambda t: float(solid.conductivity.at(t))
+        )
+    gas = study.pores.gas
+    if gas is not None:
+        found["pore_conductivity"] = _over(
+            study,
+            "pores.gas",
+            ("pressure", "temperature"),
+            lambda p, t: gas_state(gas, t, p).conductivity if p > 0.0 else 0.0,
+        )
+    return found
+
+
+def _over(
+    study: Study, place: str, names: tuple[str, ...], value: Callable[..., float]
+) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Values over every combination, along the dimensions with a list."""
+    grids = np.meshgrid(*(study.values(name) for name in names), indexing="ij")
+    try:
+        values = np.array([value(*map(float, point)) for point in zip(*(grid.ravel() for grid in grids), strict=True)])
+    except InputError as error:
+        raise ValueError(f"{place}: {error}") from None
+    several = tuple(name for name in names if name in study.axes)
+    return several, values.reshape([len(study.values(name)) for name in several])

@@ -1,0 +1,197 @@
+"""Studies with a solid, a gas, a temperature and loaded contacts by value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from etc_engine import Medium, effective_conductivity
+from etc_engine.comparison import evaluate_models, model_lines
+from etc_engine.errors import StudyError
+from etc_engine.materials import find_solid, gas_state, jump_length
+from etc_engine.medium.conditions import Conditions, pores_at
+from etc_engine.medium.rules import find_rule
+from etc_engine.models import evaluate
+from etc_engine.packing import pack
+from etc_engine.realization.realize import realize
+from etc_engine.study.conditions import derived_conductivities
+from etc_engine.study.sweep import parse_study
+from etc_engine.sweep.dataset import assemble
+from etc_engine.sweep.table import tabulate
+
+BED = """
+schema = 2
+name = "bed"
+seed = 5
+[packing]
+method = "lubachevsky-stillinger"
+radii = "equal"
+count = 8
+box = [2e-3, 2e-3, 2e-3]
+periodic = "xyz"
+density = 0.5
+[particles]
+material = "alumina"
+[contacts]
+rule = "load"
+load = 2e4
+youngs_modulus = 370e9
+poisson_ratio = 0.22
+coordination = 4.0
+[pores]
+gas = "helium"
+pressure = [1e3, 1e5]
+[radiation]
+emissivity = 0.6
+[conduction]
+temperature = [400.0, 800.0]
+material_curve = "full"
+[statistics]
+realizations = 1
+"""
+DISKS = """
+schema = 2
+name = "disks"
+seed = 6
+[packing]
+radii = "uniform:0.01:0.02"
+box = [0.3, 0.3]
+density = 0.85
+[contacts]
+rule = "hertz"
+[statistics]
+realizations = 1
+"""
+
+
+def test_every_temperature_and_pressure_is_that_of_a_medium_by_hand():
+    pytest.importorskip("CoolProp")
+    study = parse_study(BED)
+    assert study.methods == ("facets",)
+    assert list(study.axes) == ["pressure", "temperature"]
+    spec = study.realization_spec(0.5)
+    found = realize(spec, np.random.default_rng(3))
+    values = np.array([np.trace(outcome.conductivity) / 3.0 for outcome in found.cells]).reshape(2, 2)
+    packing = pack(spec.packing, np.random.default_rng(3))
+    network = find_rule("load").contacts(packing, load=2e4, youngs_modulus=370e9, poisson_ratio=0.22, coordination=4.0)
+    solid = find_solid("alumina")
+    by_hand = [
+        effective_conductivity(
+            Medium(
+                packing,
+                float(solid.conductivity.at(t)),
+                network,
+                pores_at(Conditions(t, "helium", p, None, solid.atomic_mass, 0.6), packing),
+            ),
+            material_curve="full",
+        ).mean
+        for p in (1e3, 1e5)
+        for t in (400.0, 800.0)
+    ]
+    np.testing.assert_allclose(values.ravel(), by_hand, rtol=1e-9)
+    assert (values[1] > values[0]).all()
+
+
+def test_the_result_holds_the_conductivities_that_follow():
+    pytest.importorskip("CoolProp")
+    study = parse_study(BED)
+    data = assemble(study, tabulate(study, []), {})
+    assert data["particle_conductivity"].dims == ("temperature",)
+    assert data["pore_conductivity"].dims == ("pressure", "temperature")
+    solid = find_solid("alumina").conductivity
+    np.testing.assert_array_equal(data["particle_conductivity"], [solid.at(400.0), solid.at(800.0)])
+    derived = derived_conductivities(study)["pore_conductivity"][1]
+    np.testing.assert_allclose(derived[1], [0.1902, 0.3078], rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("temperature = [400.0, 800.0]\n", "", "a gas needs a temperature"),
+        ("pressure = [1e3, 1e5]\n", "", "a gas needs a pressure"),
+        ('gas = "helium"\n', "", "a pressure is of a gas"),
+        ('gas = "helium"', 'gas = "phlogiston"', "pores.gas: "),
+        ('"alumina"', '"phlogiston"', "particles.material: there is no material named 'phlogiston'"),
+        ("[400.0, 800.0]", "[400.0, 9000.0]", "9000"),
+        ('gas = "helium"', 'gas = "helium"\nconductivity = 0.1', "pores.conductivity: has no meaning with gas"),
+        ('"alumina"', '"alumina"\nconductivity = 3.0', "particles.conductivity: has no meaning with material"),
+        ("youngs_modulus = 370e9\n", "", "rule = 'load' needs youngs_modulus"),
+        ("load = 2e4\n", "", "rule = 'load' needs load"),
+        ('material_curve = "full"', 'method = "chord"', "takes no heat through the pores"),
+        ('material_curve = "full"', 'engine = "voxel"', "takes neither a rarefied gas nor radiation"),
+        ("emissivity = 0.6", "emissivity = 1.6", "a number from 0 to 1"),
+        (
+            "coordination = 4.0",
+            "coordination = 4.0\nroughness = { height = 1e-6 }",
+            "contacts.roughness.slope: missing",
+        ),
+    ],
+)
+def test_what_is_missing_or_out_of_range_is_refused_in_one_line(old, new, message):
+    pytest.importorskip("CoolProp")
+    assert old in BED
+    text = BED.replace(old, new)
+    if "voxel" in new:
+        text = text[: text.index("[contacts]")] + text[text.index("[pores]") :]
+    with pytest.raises(StudyError) as caught:
+        parse_study(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_temperature_alone_means_nothing():
+    with pytest.raises(StudyError, match="has no meaning without a material, a gas or radiation"):
+        parse_study(DISKS + "[conduction]\ntemperature = 300.0\n")
+
+
+def test_overlaps_conduct_through_hertz_widths_of_a_softened_run():
+    """Sides of a contact of disks: half-width by R E/E_sim; a stiffer solid conducts less."""
+    soft = parse_study(DISKS)
+    text = DISKS.replace('"hertz"', '"hertz"\nyoungs_modulus = 1e11\npoisson_ratio = 0.3\nsimulated_modulus = 1e8')
+    stiff = parse_study(text)
+    means = []
+    for study in (soft, stiff):
+        (outcome,) = realize(study.realization_spec(0.85), np.random.default_rng(1)).cells
+        means.append(np.trace(outcome.conductivity))
+    assert 0.0 < means[1] < 0.7 * means[0]
+    with pytest.raises(StudyError, match="simulated_modulus needs youngs_modulus"):
+        parse_study(DISKS.replace('"hertz"', '"hertz"\nsimulated_modulus = 1e8'))
+
+
+def test_rough_contacts_conduct_less():
+    text = DISKS.replace('"hertz"', '"hertz"\nyoungs_modulus = 1e11\npoisson_ratio = 0.3')
+    rough = text.replace(
+        "[statistics]", "roughness = { height = [1e-7, 1e-6], slope = 0.1, hardness = 4e9 }\n[statistics]"
+    )
+    (smooth,) = realize(parse_study(text).realization_spec(0.85), np.random.default_rng(1)).cells
+    found = realize(parse_study(rough).realization_spec(0.85), np.random.default_rng(1)).cells
+    traces = [np.trace(outcome.conductivity) for outcome in (smooth, *found)]
+    assert traces[0] > traces[1] > traces[2] > 0.0
+
+
+def test_bed_models_take_their_inputs_from_the_result(made_sweep):
+    """100 spheres of density 0.5 in (2 mm)^3; helium of the given accommodation."""
+    pytest.importorskip("CoolProp")
+    text = BED.replace('gas = "helium"', 'gas = "helium"\naccommodation = 0.4')
+    data = made_sweep(text, lambda *_: 1.0)
+    comparison = evaluate_models(data)
+    diameter = (6.0 * 0.5 * 8e-9 / (100 * np.pi)) ** (1.0 / 3.0)
+    gas = gas_state("helium", 800.0, 1e3)
+    expected = evaluate(
+        "zehner_bauer_schluender",
+        k1=gas.conductivity,
+        k2=float(find_solid("alumina").conductivity.at(800.0)),
+        fraction=0.5,
+        dimension=3,
+        diameter=diameter,
+        temperature=800.0,
+        emissivity=0.6,
+        jump_length=jump_length(gas, 0.4),
+    )
+    found = comparison["model_conductivity"].sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
+    assert found.values.item() == pytest.approx(float(expected), rel=1e-12)
+    assert comparison["input_diameter"].values.item() == pytest.approx(diameter, rel=1e-12)
+    assert not comparison.attrs["bounds_bind"]
+    lines = model_lines(comparison)["model_conductivity"]
+    at = lines.sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
+    assert at.values.ravel()[0] == pytest.approx(float(expected), rel=1e-12)
