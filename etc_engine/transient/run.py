@@ -176,8 +176,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
         raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
-    if first.dimension != 2 or first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, 2):
-        raise StudyError(f"packing.files: expected disks in a box periodic along {file.periodic!r}, found {first.box}")
+    if first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, first.dimension):
+        raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
 
     def contacts(packing: ParticlePacking) -> ContactNetwork:
@@ -240,6 +240,10 @@ def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None
 def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
     initial = study.particles.initial
     if isinstance(initial, Gradient):
+        if len(initial.gradient) != packing.dimension:
+            raise StudyError(
+                f"particles.initial.gradient: expected {packing.dimension} numbers, found {len(initial.gradient)}"
+            )
         return np.asarray(initial.value + packing.centers @ np.array(initial.gradient))
     return initial
 
@@ -259,7 +263,7 @@ def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDAr
         path = folder / words.files
         if not path.exists():
             raise StudyError(f"packing.files: there is no file {path}")
-        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", 2))
+        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", len(words.box)))
         if box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
         table = read_particles(path, box, None if words.frames == "last" else words.frames)
