@@ -108,11 +108,11 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
     with replacing(wanted.output) as file:
         series.to_netcdf(file)
     remove_states(wanted.output)
-    last = done.states[-1]
+    last, unit = done.states[-1], series["stored_heat"].attrs["units"]
     click.echo(
         f"{wanted.output}: {done.network.packing.count} particles, {len(done.states)} times"
         f"{f' ({done.resumed} of them from before)' if done.resumed else ''}, {last.steps} steps, "
-        f"heat stored {last.stored:.6g} J/m, imbalance {last.imbalance:.1e} J/m",
+        f"heat stored {last.stored:.6g} {unit}, imbalance {last.imbalance:.1e} {unit}",
         err=True,
     )
     return 0
@@ -156,7 +156,7 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
     import json
 
     from etc_engine.sweep.claim import refuse_other_study
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     series = open_dataset(wanted.output)
     found = json.loads(series.attrs.get("study_resolved", "{}"))

@@ -104,7 +104,8 @@ def phases(dataset: xarray.Dataset) -> Phases:
                 f"models of two phases need particles of one material, this study mixes {in_words(particles)} and "
                 f"{in_words(other)} W/(m K): compare it as studies/mixture does"
             )
-    bind = study["contacts"].get("rule", "overlap") == "overlap"
+    gas = "pressure" in dataset.coords or bool((dataset.coords.get("emissivity", pores * 0.0) > 0.0).any())
+    bind = study["contacts"].get("rule", "overlap") == "overlap" and not gas
     return Phases(pores, particles, dataset.sizes["direction_i"], bind)
 
 

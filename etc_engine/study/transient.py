@@ -45,8 +45,10 @@ class FileTable(StudyTable):
     frames: Annotated[int, Field(strict=True)] | Literal["last"] = Field(
         default="last", description="'last', or the number of a frame of a dump, from 0"
     )
-    box: tuple[Positive, Positive] | None = Field(default=None, description="two positive edge lengths, of a CSV file")
-    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, of a CSV file")
+    box: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)] | None = Field(
+        default=None, description="two or three positive edge lengths, of a CSV file"
+    )
+    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, z, of a CSV file")
 
 
 def _made_or_read(packing: object) -> str:
@@ -61,6 +63,8 @@ class WallsTable(StudyTable):
     right: Wall | None = Field(default=None, description=A_WALL)
     bottom: Wall | None = Field(default=None, description=A_WALL)
     top: Wall | None = Field(default=None, description=A_WALL)
+    front: Wall | None = Field(default=None, description=f"{A_WALL}, at z = 0")
+    back: Wall | None = Field(default=None, description=f"{A_WALL}, at the far end of z")
 
     def conditions(self) -> dict[str, WallCondition]:
         """The conditions by wall."""
@@ -97,7 +101,9 @@ class Gradient(StudyTable):
     """A temperature that varies linearly: ``value`` at the origin, ``gradient`` [K/m]."""
 
     value: Number = Field(description=f"{NUMBER} [K]")
-    gradient: tuple[Number, Number] = Field(description=f"two numbers [K/m], each {NUMBER}")
+    gradient: Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)] = Field(
+        description=f"two or three numbers [K/m], one per axis, each {NUMBER}"
+    )
 
 
 class Source(StudyTable):
@@ -215,8 +221,8 @@ class NetworkStudy(StudyFile):
     @model_validator(mode="after")
     def _check(self) -> NetworkStudy:
         if isinstance(self.packing, PackingTable):
-            if len(self.packing.box) != 2 or isinstance(getattr(self.packing, "density", None), tuple):
-                raise ValueError("[packing] makes one packing: a box of two lengths, and one density")
+            if isinstance(getattr(self.packing, "density", None), tuple):
+                raise ValueError("[packing] makes one packing: give one density")
             if self.seed is None:
                 raise ValueError("seed: [packing] draws random numbers, give a whole number")
         if self.motion is None and not self.time.times:

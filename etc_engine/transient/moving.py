@@ -148,7 +148,7 @@ def march_trajectory(
     Parameters
     ----------
     trajectory : Trajectory
-        Two-dimensional.
+        Of disks or spheres.
     contacts : callable
         packing -> contact network, such as `etc_engine.medium.network.overlap_contacts`.
     build : callable

@@ -182,8 +182,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
         raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
-    if first.dimension != 2 or first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, 2):
-        raise StudyError(f"packing.files: expected disks in a box periodic along {file.periodic!r}, found {first.box}")
+    if first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, first.dimension):
+        raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, trajectory.tables[0])
 
     def contacts(packing: ParticlePacking) -> ContactNetwork:
@@ -255,7 +255,7 @@ def _particles(study: NetworkStudy, folder: Path) -> ParticleTable:
         path = folder / words.files
         if not path.exists():
             raise StudyError(f"packing.files: there is no file {path}")
-        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", 2))
+        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", len(words.box)))
         if box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
         return read_particles(path, box, None if words.frames == "last" else words.frames)
@@ -287,6 +287,8 @@ def _digest(study: NetworkStudy, course: _Course) -> str:
     box = packings[0].box
     arrays = [box.lengths, box.periodic, course.times, course.system.heat.conductance.data]
     arrays += [values for packing in packings for values in (packing.centers, packing.radii)]
+    if study.particles.initial == "file":
+        arrays += [table.temperature for table in course.tables[:1] if table.temperature is not None]
     for values in arrays:
         whole.update(np.asarray(values, dtype=np.float64).tobytes())
     return whole.hexdigest()

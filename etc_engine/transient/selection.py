@@ -77,6 +77,9 @@ def initial_of(study: NetworkStudy, table: ParticleTable) -> ArrayLike:
             raise StudyError("particles.initial: the file has no column of temperatures (temperature, f_Temp[0])")
         return table.temperature
     if isinstance(initial, Gradient):
+        d = table.packing.dimension
+        if len(initial.gradient) != d:
+            raise StudyError(f"particles.initial.gradient: expected {d} numbers, found {len(initial.gradient)}")
         return np.asarray(initial.value + table.packing.centers @ np.array(initial.gradient))
     return initial  # a number or a list
 
