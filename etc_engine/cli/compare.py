@@ -33,7 +33,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     from etc_engine.comparison import evaluate_models, fit_models, model_lines
     from etc_engine.durable.files import replacing
     from etc_engine.errors import InputError
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     if output is not None:
         check_picture(output)

@@ -122,7 +122,7 @@ def _commonest_message(output: Path, *, failed: bool) -> str:
     from collections import Counter
 
     from etc_engine.realization import Status
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     dataset = open_dataset(output)
     status = dataset["status"].values.ravel()

@@ -142,7 +142,7 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
     import json
 
     from etc_engine.sweep.claim import refuse_other_study
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     series = open_dataset(wanted.output)
     found = json.loads(series.attrs.get("study_resolved", "{}"))

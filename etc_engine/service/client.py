@@ -141,7 +141,7 @@ def fetch(server: Server, study: str, output: Path | None = None) -> xarray.Data
     OutputError
         If the file cannot be written.
     """
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     if output is not None:
         download(server, study, output)

@@ -143,7 +143,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _study_of_output(output: Path) -> tuple[str, dict[str, Any]]:
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     attributes = open_dataset(output).attrs
     return attributes["study_digest"], json.loads(attributes["study_resolved"])

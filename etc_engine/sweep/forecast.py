@@ -15,9 +15,10 @@ from etc_engine.durable.lock import Holder, alive, read_holder
 from etc_engine.errors import EtcError
 from etc_engine.study.sweep import Study, read_study
 from etc_engine.sweep.claim import difference
-from etc_engine.sweep.dataset import assemble, open_dataset
+from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.plan import Unit, units_to_run
 from etc_engine.sweep.records import Record, encode
+from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.shards import SUFFIX, ShardReader, read_study_file, shard_folder
 from etc_engine.sweep.sweep import Realize, run_unit
 from etc_engine.sweep.table import tabulate

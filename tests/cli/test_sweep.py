@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 import xarray
 
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 STUDY = """

@@ -11,7 +11,7 @@ from serving import STUDY, Service, renamed, until
 from etc_engine.cli.remote import progress_of
 from etc_engine.errors import OutputError
 from etc_engine.service import client
-from etc_engine.sweep.dataset import open_dataset
+from etc_engine.sweep.result_file import open_dataset
 
 TOKEN = "a-token-of-some-length"
 
