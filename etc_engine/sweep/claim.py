@@ -72,7 +72,9 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
     shards = sorted(folder.glob(f"*{SUFFIX}"))
     if policy == "fresh" and (shards or output.exists()):
         what = f"finished units of {output}" if shards else f"{output}"
-        raise OutputError(f"{what} exist{'' if shards else 's'}: go on with --resume, or start anew with --overwrite")
+        raise OutputError(
+            f"{what} exist{'' if shards else 's'}: continue with --resume, or start anew with --overwrite"
+        )
     if policy == "resume" and not shards and output.exists():
         refuse_other_study(study, *_study_of_output(output), str(output))
         return Claim(study, text, output, run, complete=True)
