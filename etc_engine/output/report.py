@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
-from etc_engine.study.quantities import SWEPT, heading_of
+from etc_engine.study.quantities import SWEPT, heading_of, word_of
 
 if TYPE_CHECKING:
     import xarray
@@ -191,7 +191,7 @@ def _fits(fits: Sequence[Mapping[str, Any]]) -> str:
     rows = [
         [
             fit["model"],
-            ", ".join(f"{heading_of(key)} {value}" for key, value in fit["selection"].items()) or "all",
+            ", ".join(word_of(key, value) for key, value in fit["selection"].items()) or "all",
             str(fit["points"]),
             "; ".join("{name} {value:.4g} [{low:.4g}, {high:.4g}]".format(**p) for p in fit["parameters"]),
             _number(100.0 * fit["rms_relative_residual"], ".2f"),
@@ -291,7 +291,7 @@ def _words(value: str | list[str]) -> str:
 
 
 def _labels(data: xarray.Dataset) -> list[str]:
-    return [heading_of(dim) for dim in SWEPT if dim in data["conductivity_mean"].dims]
+    return [heading_of(dim, data[dim].attrs) for dim in SWEPT if dim in data["conductivity_mean"].dims]
 
 
 def _values(data: xarray.Dataset, index: Mapping[str, int]) -> list[str]:

@@ -264,7 +264,7 @@ def study_schema() -> dict[str, Any]:
     --------
     >>> keys = study_schema()["$defs"]["ContactsTable"]["properties"]
     >>> keys["coordination"]["x-with"]["contacts.rule"]
-    ['coordination']
+    ['coordination', 'load']
     """
     found = Study.model_json_schema()
     tables = {key: node["$ref"].rpartition("/")[2] for key, node in found["properties"].items() if "$ref" in node}

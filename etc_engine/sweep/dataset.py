@@ -103,9 +103,10 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
     }
     for name, values in study.quantities.items():
         several = name in study.axes
-        found[name] = (name if several else (), np.array(values if several else values[0]), QUANTITIES[name].attributes)
+        attributes = QUANTITIES[name].attributes(study.box.dimension)
+        found[name] = (name if several else (), np.array(values if several else values[0]), attributes)
     for name, (dims, derived) in derived_conductivities(study).items():
-        found[name] = (dims, derived, {**QUANTITIES[name].attributes, "comment": DERIVED})
+        found[name] = (dims, derived, {**QUANTITIES[name].attributes(study.box.dimension), "comment": DERIVED})
     return found
 
 

@@ -149,7 +149,7 @@ def test_figures_of_many_dimensions_have_a_panel_per_combination(made_sweep):
 
     over = evaluate_models(made_sweep(text, fixed))
     figure = draw_comparison(over, model_lines(over))
-    assert figure.axes[0].get_xlabel() == "thermal resistance of a contact [K/W]"
+    assert figure.axes[0].get_xlabel() == "thermal resistance of a contact [m K/W]"
 
 
 def test_adaptive_rounds_follow_the_noisiest_cell_of_all():
