@@ -25,10 +25,11 @@ from etc_engine.medium.sides import contact_sides
 from etc_engine.packing.particles import ParticlePacking
 
 MEASURE = """
-import resource, sys
+import sys
 from etc_engine.cli import run
 status = run(sys.argv[1:])
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)
+with open("/proc/self/status") as lines:
+    print(next(line.split()[1] for line in lines if line.startswith("VmHWM")), file=sys.stderr)
 raise SystemExit(status)
 """
 
