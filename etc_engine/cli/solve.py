@@ -113,8 +113,9 @@ def solve_command(
     axes = _load_axes(asked.axis, medium)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
+    between = asked.between_walls(medium, method, axes)
     field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
-    record = _record(asked, method, result, field, axes)
+    record = {**_record(asked, method, result, field, axes), **between}
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
     if not medium.pores.conduct:
@@ -206,6 +207,16 @@ class _Asked:
         if "error_estimate" in engine.find_method(method).options and medium.packing.count <= ESTIMATED:
             options["error_estimate"] = True
         return effective_conductivity(medium, engine=engine.name, method=method, axes=axes, **options)
+
+    def between_walls(self, medium: Medium, method: str, axes: tuple[int, ...]) -> dict[str, Any]:
+        """Record of the conduction between two walls at the local temperature, if it is asked for."""
+        from etc_engine.errors import InputError
+
+        if self.physics.walls is None:
+            return {}
+        if method != "facets" or len(axes) != 1:
+            raise InputError("--wall-temperatures take method facets and one --axis")
+        return self.physics.between_walls(medium, axes[0])
 
 
 def _load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:

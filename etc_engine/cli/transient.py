@@ -45,7 +45,7 @@ def transient_command(
     """Run the transient STUDY (a TOML file with schema and kind) and write the fields to a netCDF file."""
     content, text = read_study(study)
     if overwrite and resume:
-        raise InputError("--resume goes on with what is there and --overwrite replaces it: choose one")
+        raise InputError("--resume continues with what is there and --overwrite replaces it: choose one")
     if output.exists() and not (overwrite or resume):
         raise OutputError(f"{output} exists: choose another name or give --overwrite")
     if not output.parent.is_dir():
@@ -90,14 +90,14 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
                 study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report
             )
     except InputError:
-        # what was refused leaves nothing behind, unless there is more than the start to go on from
+        # a refused study leaves nothing behind, unless there is more than the start to continue from
         if not wanted.resume and not state_path(states, 1).exists():
             remove_states(wanted.output)
         raise
     if done.stopped:
         click.echo(
             f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {done.times.size} states are "
-            f"kept, go on with --resume",
+            f"kept, continue with --resume",
             err=True,
         )
         return EXIT_RESUMABLE
@@ -142,7 +142,7 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
     import json
 
     from etc_engine.sweep.claim import refuse_other_study
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     series = open_dataset(wanted.output)
     found = json.loads(series.attrs.get("study_resolved", "{}"))

@@ -29,6 +29,7 @@ from etc_engine.realization.options import (
     DEGREE,
     DIPOLES,
     ERROR_ESTIMATE,
+    FRAME,
     GREEN,
     MATERIAL_CURVE,
     MODES,
@@ -82,13 +83,6 @@ ENGINES: Mapping[str, Engine] = {
                     dimensions_of("exact"),
                     options=("modes",),
                 ),
-                "cell": Method(
-                    "Laguerre cells: disks and the fluid between them",
-                    (2,),
-                    pores=MUST,
-                    transient=True,
-                    options=("degree", "error_estimate", "bounds"),
-                ),
                 "facets": Method(
                     "facet links: spheres and the fluid between them, one link per Laguerre facet",
                     (3,),
@@ -98,6 +92,13 @@ ENGINES: Mapping[str, Engine] = {
                     options=("dipoles", "material_curve"),
                     gas=True,
                 ),
+                "cell": Method(
+                    "Laguerre cells: disks or spheres and the fluid between them",
+                    (2, 3),
+                    pores=MUST,
+                    transient=True,
+                    options=("degree", "frame", "error_estimate", "bounds"),
+                ),
             },
             lambda media, conduction, _: dtem.solve_series(media, conduction),
             {
@@ -106,6 +107,7 @@ ENGINES: Mapping[str, Engine] = {
                 "dipoles": DIPOLES,
                 "material_curve": MATERIAL_CURVE,
                 "degree": DEGREE,
+                "frame": FRAME,
                 "error_estimate": ERROR_ESTIMATE,
                 "bounds": BOUNDS,
             },

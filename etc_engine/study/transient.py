@@ -162,7 +162,7 @@ class Time(StudyTable):
 
 
 def refuse_endless(time: Time, times: Sequence[float] | NDArray[np.float64]) -> None:
-    """Refuse steps that no run lives to see.
+    """Refuse more steps than a run can take.
 
     Raises
     ------

@@ -72,7 +72,9 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
     shards = sorted(folder.glob(f"*{SUFFIX}"))
     if policy == "fresh" and (shards or output.exists()):
         what = f"finished units of {output}" if shards else f"{output}"
-        raise OutputError(f"{what} exist{'' if shards else 's'}: go on with --resume, or start anew with --overwrite")
+        raise OutputError(
+            f"{what} exist{'' if shards else 's'}: continue with --resume, or start anew with --overwrite"
+        )
     if policy == "resume" and not shards and output.exists():
         refuse_other_study(study, *_study_of_output(output), str(output))
         return Claim(study, text, output, run, complete=True)
@@ -141,7 +143,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _study_of_output(output: Path) -> tuple[str, dict[str, Any]]:
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     attributes = open_dataset(output).attrs
     return attributes["study_digest"], json.loads(attributes["study_resolved"])

@@ -48,7 +48,7 @@ def rerun(
     Parameters
     ----------
     dataset : xarray.Dataset
-        From :func:`etc_engine.sweep.dataset.open_dataset`.
+        From :func:`etc_engine.sweep.result_file.open_dataset`.
     density : float or None
         A value of the coordinate (to six digits); None if there is only one.
     realization : int

@@ -47,7 +47,7 @@ class Transient:
     system : ParticleSystem
         At the start.
     states : list of MarchState, or of MovingState with [motion]
-        One an output time; fewer if the run was stopped.
+        One per output time; fewer if the run was stopped.
     times : ndarray [s]
         All output times.
     trajectory : Trajectory, optional
@@ -99,9 +99,9 @@ def run_transient(
     output : Path, optional
         The file that is to be written; its states are kept beside it, for `resume`.
     resume : bool
-        Whether to go on from the last state that a former run has written: it gives the same bits.
+        Whether to continue from the last state that a former run has written; the bits are the same.
     progress : callable, optional
-        Told the fraction of the time span that is done.
+        Called with the fraction of the time span that is done.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
 
 
 def _fraction(progress: Progress | None, begin: float, end: float) -> Progress | None:
-    """A progress that is told the time instead of the fraction that is done."""
+    """A progress function of the time instead of the fraction that is done."""
     if progress is None:
         return None
     tell = progress
@@ -277,7 +277,7 @@ def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
 
 
 def _source(study: NetworkStudy, count: int) -> HeatSource:
-    """Heat set free in each particle at a time; sources on one particle add up."""
+    """Heat released in each particle at a time; sources on one particle add up."""
     parts = []
     for k, source in enumerate(study.source):
         rows = np.arange(count) if source.particles is None else np.array(source.particles, dtype=np.int64)

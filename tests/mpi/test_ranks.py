@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
