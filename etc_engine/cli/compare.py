@@ -208,7 +208,7 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
 
 
 def _print_fits(fits: tuple[Fit, ...]) -> None:
-    """Fits with constants, one a line; reasons why there is none, once each."""
+    """Fits with constants, one per line; reasons why there is none, once each."""
     reasons: dict[str, str] = {}
     for fit in fits:
         where = ", ".join(f"{key} {value:g}" if key != "method" else str(value) for key, value in fit.selection.items())

@@ -31,7 +31,7 @@ def rerun_command(file: Path, density: float | None, realization: int, as_json: 
 def compare_again(
     file: Path, density: float | None, realization: int, as_json: bool, realize: Realize | None = None
 ) -> int:
-    """Run a realization again and tell the result; ``realize`` may be a stand-in."""
+    """Run a realization again and report the result; ``realize`` may be a stand-in."""
     from etc_engine import realization as real
     from etc_engine.durable.provenance import versions
     from etc_engine.sweep.rerun import rerun

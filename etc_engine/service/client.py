@@ -1,4 +1,4 @@
-"""The client: a few functions that speak to the service and answer datasets; the standard library is all they need.
+"""The client: a few functions that speak to the service and return datasets; the standard library is all they need.
 
 ::
 
@@ -105,7 +105,7 @@ def wait(
             found = status(server, study)
         except OutputError as error:
             if time.monotonic() - answered > patience:
-                again = f"the study goes on; ask again with: etc-engine fetch {study} -o result.nc"
+                again = f"the study continues; ask again with: etc-engine fetch {study} -o result.nc"
                 raise OutputError(f"{error} No answer for {patience:g} s; {again}") from None
         else:
             answered = time.monotonic()

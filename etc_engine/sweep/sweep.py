@@ -193,7 +193,7 @@ def _plan_round(claim: Claim, table: Table, targets: tuple[int, ...], computed: 
 
 
 def _run_round(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
-    """Compute the units of a round on all ranks; answers the reason if any of them stopped early."""
+    """Compute the units of a round on all ranks; returns the reason if any of them stopped early."""
     reason = _compute(round_, communicator, realize, stop)
     communicator.wait_for_all(lambda: round_.tell(communicator))
     reasons = communicator.gather(reason)
@@ -201,7 +201,7 @@ def _run_round(round_: _Round, communicator: Communicator, realize: Realize, sto
 
 
 def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
-    """Take units until there are none; answers why this rank stopped early, or nothing.
+    """Take units until there are none; returns why this rank stopped early, or nothing.
 
     Every rank takes one number beyond the last unit: the next round's base allows for it.
     """
@@ -237,7 +237,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     """
     started = time.time()
     try:
-        result = realize(spec, unit_rng(study.seed, unit))
+        result = realize(study.for_realization(spec, unit.realization), unit_rng(study.seed, unit))
     except (MemoryError, OSError) as error:
         place = "the packer's own density" if unit.density is None else f"density {unit.density:g}"
         raise OutputError(

@@ -169,7 +169,7 @@ def test_an_existing_output_is_refused_resumed_or_replaced(stand_in, study, tmp_
     refused = stand_in(study, "-o", output, "--log", log)
     assert refused.returncode == 2
     assert refused.stderr.splitlines() == [
-        f"etc-engine: {output} exists: go on with --resume, or start anew with --overwrite"
+        f"etc-engine: {output} exists: continue with --resume, or start anew with --overwrite"
     ]
     resumed = stand_in(study, "-o", output, "--log", log, "--policy", "resume")
     assert resumed.returncode == 0
@@ -238,7 +238,7 @@ def test_a_full_disk_stops_resumably(stand_in, study, tmp_path):
     stopped = process(study, "-o", output, "--log", log, "--file-limit", 3000)
     assert stopped.returncode == 75
     assert "cannot write shard" in stopped.stderr
-    assert "go on with --resume" in stopped.stderr
+    assert "continue with --resume" in stopped.stderr
     resumed = process(study, "-o", output, "--policy", "resume", "--log", log, "--file-limit", 20000)
     assert resumed.returncode == 75  # the shards fit, the dataset does not
     assert f"cannot write {output}" in resumed.stderr

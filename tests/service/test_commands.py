@@ -70,7 +70,7 @@ def test_who_waits_outlasts_a_new_start_of_the_service(tmp_path):
         waiter.start()
         until(lambda: client.status(service.server, study)["done"] >= 1)
         server = service.server
-    words = rf"the study goes on; ask again with: etc-engine fetch {study}"
+    words = rf"the study continues; ask again with: etc-engine fetch {study}"
     with pytest.raises(OutputError, match=words):
         client.wait(server, study, interval=0.1, patience=0.3)
     with Service(data, {"port": port}, slow=True):
