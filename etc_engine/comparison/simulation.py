@@ -109,6 +109,10 @@ def phases(dataset: xarray.Dataset) -> Phases:
     return Phases(pores, particles, dataset.sizes["direction_i"], bind)
 
 
+MANY = 6
+"""More values than this are told by their lowest and highest."""
+
+
 def in_words(values: Any) -> str:
     """One number, or several, for readers.
 
@@ -116,8 +120,13 @@ def in_words(values: Any) -> str:
     --------
     >>> in_words(2.0), in_words(np.array([1.0, 5.0]))
     ('2', '1, 5')
+    >>> in_words(np.linspace(0.25, 0.5, 20))
+    '0.25 to 0.5'
     """
-    return ", ".join(f"{value:g}" for value in np.ravel(values))
+    several = np.ravel(values)
+    if several.size > MANY:
+        return f"{several.min():g} to {several.max():g}"
+    return ", ".join(f"{value:g}" for value in several)
 
 
 def mean_diagonal(tensor: xarray.DataArray) -> xarray.DataArray:
