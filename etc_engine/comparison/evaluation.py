@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from etc_engine.comparison.inputs import known_inputs
 from etc_engine.comparison.simulation import Phases, mean_diagonal, phases, simulated, study_of
 from etc_engine.errors import InputError
 from etc_engine.models import evaluate
@@ -40,6 +42,12 @@ FILLED_MODELS = (
     "differential",
 )
 """Those of particles in a medium that conducts, which need no contacts."""
+
+HEATED_MODELS = ("zehner_bauer_schluender", "breitbach_barthels", "kunii_smith_radiation")
+"""Beside those for beds of spheres at a temperature, with gas and radiation."""
+
+INPUT = "input_"
+"""Of the names of variables that hold further inputs of models."""
 
 BINDING = ("series", "parallel", "hashin_shtrikman_lower", "hashin_shtrikman_upper")
 """Bounds of every isotropic two-phase medium; three-point bounds hold for their own zeta2 only."""
@@ -80,6 +88,9 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
 
     Notes
     -----
+    Further inputs of a model that the sweep knows are taken from it, see `etc_engine.comparison.inputs.known_inputs`,
+    and stand in the result as ``input_<name>``; ``parameters`` given for a model come first.
+
     k1 is the conductivity of the pores, k2 that of the particles, the fraction the mean solid fraction of the density.
     Where the pores insulate (k1 = 0) every model with the pores as its matrix is 0: Maxwell, differential medium, lower
     Hashin-Shtrikman. The contact mean field is the sweep's own, on the networks it solved; it takes the pipe resistance
@@ -94,7 +105,8 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
     import xarray
 
     medium = phases(dataset)
-    parameters = _with_bounds(_wanted(dataset, models, medium))
+    inputs = known_inputs(dataset)
+    parameters = _with_bounds(_wanted(dataset, models, medium, inputs))
     simulation = simulated(dataset)
     fraction = simulation["solid_fraction"]
     columns, notes = [], []
@@ -104,7 +116,7 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
             columns.append(dataset["mean_field_conductivity"].where(valid).mean("realization"))
             notes.append("")
         else:
-            column, note = model_curve(name, medium, fraction, values)
+            column, note = model_curve(name, medium, fraction, {**_of_model(name, inputs), **values})
             columns.append(column)
             notes.append(note)
     result = simulation
@@ -125,6 +137,8 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         "dimension": medium.dimension,
         "model_parameters": json.dumps({name: dict(values) for name, values in parameters.items()}),
     }
+    for name, known in inputs.items():
+        result[INPUT + name] = known
     _add_differences(result)
     _add_bounds(result, dataset, medium)
     _add_best(result)
@@ -134,7 +148,10 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
 
 
 def model_curve(
-    name: str, medium: Phases, fraction: xarray.DataArray, parameters: Mapping[str, float] | None = None
+    name: str,
+    medium: Phases,
+    fraction: xarray.DataArray,
+    parameters: Mapping[str, float | xarray.DataArray] | None = None,
 ) -> tuple[xarray.DataArray, str]:
     """A model at solid fractions, NaN where it has no value, and a note that says why, or why it is 0.
 
@@ -147,12 +164,12 @@ def model_curve(
     fraction : DataArray
         Solid fractions; NaN where there is none.
     parameters : mapping, optional
-        Further inputs of the model.
+        Further inputs of the model: numbers, or arrays on dimensions of the sweep.
 
     Returns
     -------
     conductivity : DataArray [W/(m K)]
-        On the dimensions of the fraction and of the two conductivities.
+        On the dimensions of the fraction, of the two conductivities and of the further inputs.
     note : str
 
     Examples
@@ -166,15 +183,18 @@ def model_curve(
     """
     import xarray
 
-    f, pores, particles = xarray.broadcast(fraction, medium.pores, medium.particles)
+    further = {key: xarray.DataArray(value) for key, value in (parameters or {}).items()}
+    plain = [array.reset_coords(drop=True) for array in (fraction, medium.pores, medium.particles, *further.values())]
+    f, pores, particles, *arrays = xarray.broadcast(*plain)
     values, reasons = np.full(f.shape, np.nan), []
     for place in np.ndindex(f.shape):
         if np.isnan(f.values[place]):
             continue
         k1, k2 = float(pores.values[place]), float(particles.values[place])
+        here = {key: float(array.values[place]) for key, array in zip(further, arrays, strict=True)}
         try:
             values[place] = evaluate(
-                name, k1=k1, k2=k2, fraction=float(f.values[place]), dimension=medium.dimension, **(parameters or {})
+                name, k1=k1, k2=k2, fraction=float(f.values[place]), dimension=medium.dimension, **here
             )
         except InputError as error:
             reasons.append(str(error))
@@ -215,15 +235,39 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
     parameters = json.loads(attrs["model_parameters"])
     names = [str(name) for name in comparison["model"].values if str(name) != MEAN_FIELD]
     fractions = xarray.DataArray(fraction, coords={"density": density}, dims="density")
-    curves = [model_curve(name, medium, fractions, parameters[name])[0] for name in names]
+    inputs = {
+        name.removeprefix(INPUT): _along(comparison[name], known, density)
+        for name in map(str, comparison.data_vars)
+        if name.startswith(INPUT)
+    }
+    given = {name: {**_of_model(name, inputs), **parameters[name]} for name in names}
+    curves = [model_curve(name, medium, fractions, given[name])[0] for name in names]
     labels = xarray.DataArray(np.array(names, dtype=object), dims="model", name="model")
     return xarray.concat(curves, dim=labels, coords="minimal", compat="override").to_dataset(name="model_conductivity")
 
 
-def _wanted(dataset: xarray.Dataset, models: Models | None, medium: Phases) -> dict[str, Mapping[str, float]]:
+def _of_model(name: str, inputs: Mapping[str, xarray.DataArray]) -> dict[str, float | xarray.DataArray]:
+    """Those of the known inputs that a model takes."""
+    return {item.name: inputs[item.name] for item in find_model(name).inputs if item.name in inputs}
+
+
+def _along(values: xarray.DataArray, known: NDArray[np.bool_], density: NDArray[np.float64]) -> xarray.DataArray:
+    """An input between the densities of the sweep that have a solid fraction."""
+    if "density" not in values.dims:
+        return values
+    if known.sum() < 2:
+        return values.assign_coords(density=density)
+    return values.isel(density=known).interp(density=density)
+
+
+def _wanted(
+    dataset: xarray.Dataset, models: Models | None, medium: Phases, inputs: Mapping[str, xarray.DataArray]
+) -> dict[str, Mapping[str, float]]:
     """Names and parameters asked for, checked."""
     if models is None:
         by_default = FILLED_MODELS if medium.pores_conduct else DEFAULT_MODELS
+        if medium.dimension == 3 and "temperature" in inputs:
+            by_default = (*by_default, *HEATED_MODELS)
         models = study_of(dataset)["models"]["names"] or by_default
     wanted = dict(models) if isinstance(models, Mapping) else {name: {} for name in models}
     for name, parameters in wanted.items():

@@ -181,4 +181,4 @@ def affine_conductivity(box: Box, branches: NDArray[np.float64], conductances: N
     branches : ndarray, shape (m, d) [m]
     conductances : ndarray, shape (m,) [W/K, in 2D W/(m K)]
     """
-    return float(conductances @ (branches**2).sum(axis=1) / (box.dimension * box.volume))
+    return float((conductances * (branches**2).sum(axis=1)).sum() / (box.dimension * box.volume))

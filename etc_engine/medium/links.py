@@ -21,6 +21,7 @@ from etc_engine.medium.backbone import Backbone, find_backbone
 from etc_engine.medium.loads import Links, driven_walls, first_of_clusters, link_loads
 from etc_engine.solvers import SolveReport, build_preconditioner, solve_loads
 from etc_engine.solvers.amg_cg import EXACT_LEVEL
+from etc_engine.solvers.summation import inner
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +118,10 @@ def solve_links(
     if box.periodic[axes[0]]:
         inside = np.flatnonzero(free)
         free[inside[first_of_clusters(backbone.clusters[inside])]] = False
-    inner = csr_matrix(matrix[free][:, free])
-    preconditioner = build_preconditioner(inner, exact_level) if inner.shape[0] else None
+    system = csr_matrix(matrix[free][:, free])
+    preconditioner = build_preconditioner(system, exact_level) if system.shape[0] else None
     temperatures[free], reports = solve_loads(
-        inner, rhs[free], lifts, preconditioner=preconditioner, tolerance=tolerance
+        system, rhs[free], lifts, preconditioner=preconditioner, tolerance=tolerance
     )
     if box.periodic[axes[0]]:
         temperatures += links.packing.centers[:, list(axes)]
@@ -133,7 +134,7 @@ def solve_links(
         column = np.ascontiguousarray(temperatures[:, load])
         fill_dead_ends(column, links.pairs[conductances > 0.0], loads.offsets[conductances > 0.0, load])
         temperatures[:, load] = column
-    energies = drops.T @ flows + wall_drops.T @ wall_flows
+    energies = inner(drops, flows) + inner(wall_drops, wall_flows)
     return LinkSolution(axes, links.walls, backbone, temperatures, flows, wall_flows, energies, reports)
 
 

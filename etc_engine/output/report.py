@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
-from etc_engine.study.quantities import SWEPT, heading_of
+from etc_engine.study.quantities import SWEPT, heading_of, word_of
 
 if TYPE_CHECKING:
     import xarray
@@ -89,6 +89,11 @@ def report_page(
     )
 
 
+def _packing(packing: Mapping[str, Any]) -> str:
+    """What made the packings, or the files that hold them."""
+    return f"files {packing['files']}" if "files" in packing else f"{packing['method']}, {packing['radii']}"
+
+
 def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[str, Any]) -> str:
     status = dataset["status"].values
     failed = int(((status > Status.NOT_PERCOLATING) & (status < Status.NOT_RUN)).sum())
@@ -96,7 +101,7 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     bound = "broken" if comparison.attrs["bound_broken"] else "kept"
     box = " x ".join(f"{length:g}" for length in study["packing"]["box"])
     facts = {
-        "packing": f"{study['packing']['method']}, {study['packing']['radii']}",
+        "packing": _packing(study["packing"]),
         "box [m]": f"{box}, {study['packing']['periodic'] or 'not'} periodic",
         "contacts": study["contacts"].get("rule", "none: the whole cell is solved"),
         "engine and method": f"{study['conduction']['engine']}, {_words(study['conduction']['method'])}",
@@ -191,7 +196,7 @@ def _fits(fits: Sequence[Mapping[str, Any]]) -> str:
     rows = [
         [
             fit["model"],
-            ", ".join(f"{heading_of(key)} {value}" for key, value in fit["selection"].items()) or "all",
+            ", ".join(word_of(key, value) for key, value in fit["selection"].items()) or "all",
             str(fit["points"]),
             "; ".join("{name} {value:.4g} [{low:.4g}, {high:.4g}]".format(**p) for p in fit["parameters"]),
             _number(100.0 * fit["rms_relative_residual"], ".2f"),
@@ -291,7 +296,7 @@ def _words(value: str | list[str]) -> str:
 
 
 def _labels(data: xarray.Dataset) -> list[str]:
-    return [heading_of(dim) for dim in SWEPT if dim in data["conductivity_mean"].dims]
+    return [heading_of(dim, data[dim].attrs) for dim in SWEPT if dim in data["conductivity_mean"].dims]
 
 
 def _values(data: xarray.Dataset, index: Mapping[str, int]) -> list[str]:

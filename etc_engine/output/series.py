@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.box import AXES
 from etc_engine.durable.provenance import command_line, engine_commit, engine_version, now, versions
 from etc_engine.errors import InputError, OutputError
 from etc_engine.medium.walls import WALLS
@@ -19,6 +20,9 @@ from etc_engine.transient.run import Transient
 
 if TYPE_CHECKING:
     import xarray
+
+UNITS = {2: ("W m-1", "J m-1", "J m-1 K-1"), 3: ("W", "J", "J K-1")}
+"""Of heat flows, heats and heat capacities, by dimension; in 2D per unit thickness."""
 
 
 def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
@@ -33,7 +37,7 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
     Returns
     -------
     xarray.Dataset
-        Dimensions ``time``, ``particle`` and ``wall``; everything per unit thickness. ``stored_heat`` is the sum of
+        Dimensions ``time``, ``particle`` and ``wall``; of disks all per unit thickness. ``stored_heat`` is the sum of
         ``wall_heat`` and ``source_heat``; ``heat_imbalance`` is what is left of that. Of moving particles, centres and
         radii have the dimension ``time`` too, and ``particle`` holds the ids of the dump.
     """
@@ -46,19 +50,19 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
     stored = np.array([state.stored for state in states])
     steps, iterations = np.array([(state.steps, state.iterations) for state in states]).T
     where, centers, radii = _places(transient)
-    data = {
-        "x": (where, centers[..., 0], "m", "centre"),
-        "y": (where, centers[..., 1], "m", "centre"),
+    flow, energy, capacity = UNITS[packing.dimension]
+    data = {name: (where, centers[..., axis], "m", "centre") for axis, name in enumerate(AXES[: packing.dimension])}
+    data |= {
         "radius": (where, radii, "m", "radius"),
-        "heat_capacity": ("particle", capacities, "J m-1 K-1", "heat capacity of the particle per unit thickness"),
+        "heat_capacity": ("particle", capacities, capacity, "heat capacity of the particle"),
         "temperature": (("time", "particle"), means, "K", "mean temperature of the particle"),
         "mean_temperature": ("time", means @ capacities / capacities.sum(), "K", "mean temperature, by heat capacity"),
-        "wall_heat_flow": (("time", "wall"), rates[:, :-1], "W m-1", "heat flow from the wall into the particles"),
-        "wall_heat": (("time", "wall"), heat[:, :-1], "J m-1", "heat from the wall since the start"),
-        "source_heat_flow": ("time", rates[:, -1], "W m-1", "heat flow of the sources"),
-        "source_heat": ("time", heat[:, -1], "J m-1", "heat of the sources since the start"),
-        "stored_heat": ("time", stored, "J m-1", "heat stored in the particles since the start"),
-        "heat_imbalance": ("time", stored - heat.sum(axis=1), "J m-1", "heat stored less heat that came in"),
+        "wall_heat_flow": (("time", "wall"), rates[:, :-1], flow, "heat flow from the wall into the particles"),
+        "wall_heat": (("time", "wall"), heat[:, :-1], energy, "heat from the wall since the start"),
+        "source_heat_flow": ("time", rates[:, -1], flow, "heat flow of the sources"),
+        "source_heat": ("time", heat[:, -1], energy, "heat of the sources since the start"),
+        "stored_heat": ("time", stored, energy, "heat stored in the particles since the start"),
+        "heat_imbalance": ("time", stored - heat.sum(axis=1), energy, "heat stored less heat that came in"),
         "steps": ("time", steps, "1", "steps since the start"),
         "iterations": (
             "time",
@@ -78,6 +82,7 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
         coords={
             "time": ("time", np.array([s.time for s in states]), {"units": "s", "long_name": "time", "axis": "T"}),
             "wall": ("wall", list(WALLS[: rates.shape[1] - 1]), {"long_name": "wall of the box"}),
+            **_ids(transient),
         },
         attrs={
             "Conventions": "CF-1.11",
@@ -115,6 +120,14 @@ def _rates_and_means(transient: Transient) -> tuple[NDArray[np.float64], NDArray
     return np.array(rates), np.array(means)
 
 
+def _ids(transient: Transient) -> dict[str, Any]:
+    """The ids of the particles as a coordinate, where their file has them."""
+    ids = transient.tables[0].ids if transient.tables else None
+    if ids is None or np.unique(ids).size != ids.size:
+        return {}
+    return {"particle": ("particle", ids, {"long_name": "id of the particle in its file"})}
+
+
 def _places(transient: Transient) -> tuple[Any, NDArray[np.float64], NDArray[np.float64]]:
     """Dimensions, centres and radii of the particles."""
     packing = transient.network.packing
@@ -144,7 +157,7 @@ def _changes(transient: Transient) -> dict[str, tuple[Any, Any, str, str]]:
 
 
 def particle_capacities(transient: Transient) -> NDArray[np.float64]:
-    """Heat capacity of each particle, shape (n,) [J/(m K)]; of moving ones that of the whole disk."""
+    """Heat capacity of each particle, shape (n,) [J/K, in 2D J/(m K)]; of moving ones that of the whole particle."""
     if transient.trajectory is not None:
         rho_c = np.asarray(transient.study.particles.heat_capacity, dtype=np.float64)
         return np.asarray(transient.network.packing.measures * rho_c)
@@ -173,7 +186,7 @@ def check_vtk_series(path: Path, *, overwrite: bool = False) -> None:
 def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
     """Write a ``.pvd`` collection, and beside it a folder of ``.vtp`` files, one an output time.
 
-    Polygons of the particles; cell data ``temperature`` and ``particle``.
+    Polygons of disks, points of spheres with point data ``radius``; cell data ``temperature`` and ``particle``.
 
     Parameters
     ----------
@@ -200,11 +213,12 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
             "writing VTK files needs the library vtk: install the extra with pip install 'etc-engine[vtk]'"
         ) from None
     to_vtk: Any = numpy_support.numpy_to_vtk
+    count, spheres = series.sizes["particle"], "z" in series
     turn = 2.0 * np.pi * np.arange(SPOKES) / SPOKES
-    rim = np.stack([np.cos(turn), np.sin(turn), np.zeros(SPOKES)], axis=1)
-    count = series.sizes["particle"]
+    rim = np.zeros((1, 3)) if spheres else np.stack([np.cos(turn), np.sin(turn), np.zeros(SPOKES)], axis=1)
     data = vtkPolyData()
-    data.SetPolys(vtk_cells([np.arange(count * SPOKES).reshape(-1, SPOKES)]))
+    cells = vtk_cells([np.arange(count * len(rim)).reshape(-1, len(rim))])
+    (data.SetVerts if spheres else data.SetPolys)(cells)
     folder = path.with_suffix("")
     try:
         folder.mkdir(exist_ok=True)
@@ -214,8 +228,8 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
         raise OutputError(f"cannot write {folder}: {error.strerror}") from None
     entries = []
     for k, time in enumerate(series["time"].values):
-        place = series[["x", "y", "radius", "temperature"]].isel(time=k)
-        centers = np.column_stack([place["x"], place["y"], np.zeros(count)])
+        place = series.isel(time=k)
+        centers = np.column_stack([place["x"], place["y"], place["z"] if spheres else np.zeros(count)])
         points = vtkPoints()
         points.SetData(
             to_vtk((centers[:, None] + place["radius"].values[:, None, None] * rim).reshape(-1, 3), deep=True)
@@ -228,6 +242,10 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
             data.GetCellData().RemoveArray(name)
             data.GetCellData().AddArray(array)
         data.GetCellData().SetActiveScalars("temperature")
+        if spheres:
+            radii = to_vtk(np.ascontiguousarray(place["radius"].values), deep=True)
+            radii.SetName("radius")
+            data.GetPointData().AddArray(radii)
         file = folder / f"{folder.name}-{k:05d}.vtp"
         writer = vtkXMLPolyDataWriter()
         writer.SetFileName(str(file))

@@ -13,6 +13,7 @@ value can only overestimate lambda_min.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from scipy.sparse.linalg import splu
 
 from etc_engine.errors import ConvergenceError
 from etc_engine.solvers.aggregation import aggregation_hierarchy
+from etc_engine.solvers.summation import dot
 
 # Below this many unknowns one sparse factorisation is faster than a multigrid hierarchy.
 EXACT_LEVEL = 20_000
@@ -207,12 +209,12 @@ def solve_energy(
     r = rhs - matrix @ u if initial is not None else rhs.copy()
     z = preconditioner.apply(r)
     p = z.copy()
-    rho = float(r @ z)
-    rhs_norm = float(np.linalg.norm(rhs)) or 1.0
+    rho = dot(r, z)
+    rhs_norm = math.sqrt(dot(rhs, rhs)) or 1.0
     uniform = np.ones_like(rhs) if conserved is None else conserved
     steps: list[float] = []
     ratios: list[float] = []
-    history = [float(np.linalg.norm(r)) / rhs_norm]
+    history = [math.sqrt(dot(r, r)) / rhs_norm]
     ritz = np.nan
 
     def report(error: float, imbalance: float) -> SolveReport:
@@ -233,22 +235,22 @@ def solve_energy(
         return u, report(0.0, 0.0)
     while len(steps) < limits.max_iterations:
         q = matrix @ p
-        curvature = float(p @ q)
+        curvature = dot(p, q)
         if not (rho > 0.0 and curvature > 0.0):
             break
         steps.append(rho / curvature)
         u += steps[-1] * p
         r -= steps[-1] * q
-        history.append(float(np.linalg.norm(r)) / rhs_norm)
+        history.append(math.sqrt(dot(r, r)) / rhs_norm)
         z = preconditioner.apply(r)
-        rho_next = float(r @ z)
+        rho_next = dot(r, z)
         ratios.append(rho_next / rho)
         # E_lift - 2 b.u + u.K u, which holds for any iterate
-        energy = max(lift_energy - float(u @ (rhs + r)), ROUND_OFF * lift_energy)
+        energy = max(lift_energy - dot(u, rhs + r), ROUND_OFF * lift_energy)
         ritz = smallest_ritz_value(steps, ratios)
         mu = min(0.5 * ritz, np.inf if limits.spectral_floor is None else limits.spectral_floor)
         error = max(radau_factor(steps, ratios, mu) * rho_next, 0.0) / energy
-        imbalance = abs(float(uniform @ r)) / energy
+        imbalance = abs(dot(uniform, r)) / energy
         if error <= tolerance and imbalance <= limits.balance_tolerance:
             if imbalance > BALANCED:
                 imbalance = _balance(matrix, rhs, u, uniform) / energy
@@ -332,10 +334,10 @@ def _balance(
     """Shift u, in place, by the uniform temperature that balances the heat flows; returns what is left of w . r."""
     load = matrix @ uniform
     residual = rhs - matrix @ u
-    shift = float(uniform @ residual) / float(uniform @ load)
+    shift = dot(uniform, residual) / dot(uniform, load)
     u += shift * uniform
     residual -= shift * load
-    return abs(float(uniform @ residual))
+    return abs(dot(uniform, residual))
 
 
 def smallest_ritz_value(steps: list[float], ratios: list[float]) -> float:

@@ -20,13 +20,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix
 
 from etc_engine.errors import ConvergenceError
 from etc_engine.solvers.amg_cg import ROUND_OFF, Limits, Preconditioner, build_preconditioner, solve_loads
+from etc_engine.solvers.summation import combine, inner
 
 # A snapshot that keeps less than this part of its norm beside the basis has nothing to add but round-off.
 DEPENDENT = 1e-11
@@ -259,15 +259,15 @@ def _reduced(
     lift_flows, flows = flows[:, : space.loads], flows[:, space.loads :]
     for extra in range(MOST_CORRECTIONS + 1):
         try:
-            y = _solve_small(_inner(rows, flows), -_inner(rows, lift_flows))
+            y = _solve_small(inner(rows, flows), -inner(rows, lift_flows))
         except np.linalg.LinAlgError:
             return None
-        q = lift_flows + _combine(flows, y)
-        energies = _inner(space.lift + _combine(rows, y), q)
+        q = lift_flows + combine(flows, y)
+        energies = inner(space.lift + combine(rows, y), q)
         residual = -space.gather(q)
         lift_energies = np.einsum("ia,ia->a", space.lift, lift_flows)
         scale = np.maximum(np.diag(energies), max(ROUND_OFF * lift_energies.max(), np.finfo(np.float64).tiny))
-        if np.any(np.abs(_inner(space.conserved[:, None], residual)) > BALANCE * scale):
+        if np.any(np.abs(inner(space.conserved[:, None], residual)) > BALANCE * scale):
             return None
         z = np.column_stack([reference.preconditioner.apply(r) for r in np.ascontiguousarray(residual.T)])
         error = float((np.maximum(np.einsum("ia,ia->a", residual, z), 0.0) / (mu * scale)).max())
@@ -277,7 +277,7 @@ def _reduced(
         added = space.rows(vectors[:, rows.shape[1] :])
         rows, flows = np.hstack([rows, added]), np.hstack([flows, member.apply(added)])
     seconds = time.perf_counter() - start
-    u = _combine(vectors, y)
+    u = combine(vectors, y)
     return FamilySolution(u, energies, error, reference.proven, basis.snapshots, 0, seconds)
 
 
@@ -302,7 +302,7 @@ def _full(
     u, reports = solve_loads(
         matrix,
         rhs,
-        np.array([column @ flow for column, flow in zip(space.lift.T, flows.T, strict=True)]),
+        np.einsum("ia,ia->a", space.lift, flows),
         preconditioner=preconditioner,
         initial=None if nearby is None else nearby.u,
         tolerance=tolerance,
@@ -317,7 +317,7 @@ def _full(
     t = space.lift + space.rows(u)
     solution = FamilySolution(
         u,
-        _inner(t, member.apply(t)),
+        inner(t, member.apply(t)),
         max(report.relative_energy_error for report in reports),
         False,
         0,
@@ -332,7 +332,7 @@ def _orthonormal(basis: NDArray[np.float64], vectors: NDArray[np.float64]) -> ND
     for vector in vectors.T:
         rest = vector[:, None] / (_length(vector[:, None]) or 1.0)
         for _ in range(2):
-            rest = rest - _combine(basis, _inner(basis, rest))
+            rest = rest - combine(basis, inner(basis, rest))
         length = _length(rest)
         if length > DEPENDENT:
             basis = np.hstack([basis, rest / length])
@@ -340,36 +340,4 @@ def _orthonormal(basis: NDArray[np.float64], vectors: NDArray[np.float64]) -> ND
 
 
 def _length(vector: NDArray[np.float64]) -> float:
-    return float(np.sqrt(_inner(vector, vector).item()))
-
-
-def _combine(columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The product of a tall and a small matrix, without BLAS, whose bits depend on the number of threads."""
-    return np.asarray(np.einsum("iq,qa->ia", columns, weights))
-
-
-def _inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Inner products of the columns of two tall matrices, without BLAS."""
-    return np.asarray(_sum_products(np.ascontiguousarray(a), np.ascontiguousarray(b)))
-
-
-@njit(cache=True)
-def _sum_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums over short blocks of rows, four at a time, then over the blocks: fast, and little round-off."""
-    rows = a.shape[0]
-    total = np.zeros((a.shape[1], b.shape[1]))
-    for first in range(0, rows, 256):
-        last = min(first + 256, rows)
-        even = last - (last - first) % 4
-        for j in range(a.shape[1]):
-            for k in range(b.shape[1]):
-                s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
-                for i in range(first, even, 4):
-                    s0 += a[i, j] * b[i, k]
-                    s1 += a[i + 1, j] * b[i + 1, k]
-                    s2 += a[i + 2, j] * b[i + 2, k]
-                    s3 += a[i + 3, j] * b[i + 3, k]
-                for i in range(even, last):
-                    s0 += a[i, j] * b[i, k]
-                total[j, k] += (s0 + s1) + (s2 + s3)
-    return total
+    return float(np.sqrt(inner(vector, vector).item()))

@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.solvers.amg_cg import EXACT_LEVEL, Preconditioner, build_preconditioner
+from etc_engine.solvers.summation import dot
 
 MOST_ITERATIONS = 500
 
@@ -62,20 +63,20 @@ class StepMatrix:
         r = rhs - self.matrix @ x
         z = self.preconditioner.apply(r)
         p = z.copy()
-        rho = float(r @ z)
+        rho = dot(r, z)
         history = [_largest(z)]
         for iteration in range(MOST_ITERATIONS):
             if history[-1] <= self.tolerance * _largest(x):
                 return x, iteration
             q = self.matrix @ p
-            curvature = float(p @ q)
+            curvature = dot(p, q)
             if not (rho > 0.0 and curvature > 0.0):
                 break
             x += (rho / curvature) * p
             r -= (rho / curvature) * q
             z = self.preconditioner.apply(r)
             history.append(_largest(z))
-            rho_next = float(r @ z)
+            rho_next = dot(r, z)
             p *= rho_next / rho
             p += z
             rho = rho_next

@@ -56,6 +56,8 @@ class Quantity:
         None where the study need not give a value.
     si : float
         Factor from the unit of the study file to that of the engine.
+    plane : str
+        Units of disks, per unit thickness, where they are others than those of spheres.
     """
 
     place: str
@@ -68,6 +70,7 @@ class Quantity:
     default: float | None = None
     comment: str = ""
     si: float = 1.0
+    plane: str = ""
 
     @property
     def table(self) -> str:
@@ -79,10 +82,10 @@ class Quantity:
         """The key in its table."""
         return self.place.rpartition(".")[2]
 
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Attributes of the dimension in the result."""
-        found = {"long_name": self.long_name, "units": self.units, "comment": self.comment}
+    def attributes(self, dimension: int) -> dict[str, str]:
+        """Attributes of the dimension in a result of disks (2) or spheres (3)."""
+        units = self.plane if self.plane and dimension == 2 else self.units
+        found = {"long_name": self.long_name, "units": units, "comment": self.comment}
         return {key: value for key, value in found.items() if value}
 
     def field(self) -> tuple[Any, Any]:
@@ -90,7 +93,8 @@ class Quantity:
         check: Any = self.check
         several: Any = Annotated[tuple[check, ...], AfterValidator(_ascending), Field(min_length=1)]
         one_or_several: Any = Annotated[Annotated[check, Tag(AS_NUMBER)] | Annotated[several, Tag(AS_LIST)], WRITTEN]
-        units = "" if self.units == "1" else f" [{self.units}]"
+        plane = f", of disks {readable(self.plane)}" if self.plane else ""
+        units = "" if self.units == "1" else f" [{readable(self.units)}{plane}]"
         described = f"{self.allowed}{units}, or a list of different ones"
         required = self.default is None and self.table.count(".") > 0  # a table in a table says all of it
         return (
@@ -117,6 +121,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             comment="half of the angle that the contact subtends at the centre of a particle; not a wetting angle",
             si=float(np.pi / 180.0),
         ),
+        Quantity("contacts.contact_radius", "m", "contact radius", "contacts", Positive, POSITIVE),
         Quantity(
             "contacts.bond_gap",
             "1",
@@ -135,7 +140,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             NotNegative,
             NOT_NEGATIVE,
             default=0.0,
-            comment="of disks per unit thickness, m K W-1",
+            plane="m K W-1",
         ),
         Quantity(
             "contacts.youngs_modulus",
@@ -293,21 +298,31 @@ def word_of(name: str, value: Any) -> str:
     return f"{name.replace('_', ' ')} {value:.4g}"
 
 
-def heading_of(name: str) -> str:
-    """The heading of a column or an axis that holds a dimension.
+def heading_of(name: str, attributes: Mapping[str, str]) -> str:
+    """The heading of a column or an axis that holds a dimension with these attributes.
 
     Examples
     --------
-    >>> heading_of("contact_angle"), heading_of("particle_conductivity"), heading_of("density")
-    ('contact half-angle [degree]', 'conductivity of the particles [W/(m K)]', 'density')
+    >>> heading_of("contact_resistance", QUANTITIES["contact_resistance"].attributes(2))
+    'thermal resistance of a contact [m K/W]'
+    >>> heading_of("density", QUANTITIES["density"].attributes(2)), heading_of("method", {})
+    ('density', 'method')
     """
-    row = QUANTITIES.get(name)
-    if row is None:
-        return name
-    if row.units == "1":
-        return row.long_name
-    return f"{row.long_name} [{READABLE.get(row.units, row.units)}]"
+    units = attributes.get("units", "1")
+    return attributes.get("long_name", name) + ("" if units == "1" else f" [{readable(units)}]")
 
 
-READABLE = {"W m-1 K-1": "W/(m K)", "K W-1": "K/W"}
-"""Units as they are written for readers."""
+def readable(units: str) -> str:
+    """Units as they are written for readers.
+
+    Examples
+    --------
+    >>> readable("W m-1 K-1"), readable("m K W-1"), readable("Pa")
+    ('W/(m K)', 'm K/W', 'Pa')
+    """
+    above = [word for word in units.split() if "-" not in word]
+    below = [word.replace("-1", "").replace("-", "") for word in units.split() if "-" in word]
+    if not below:
+        return units
+    under = below[0] if len(below) == 1 else f"({' '.join(below)})"
+    return f"{' '.join(above) or '1'}/{under}"

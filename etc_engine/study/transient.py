@@ -45,8 +45,10 @@ class FileTable(StudyTable):
     frames: Annotated[int, Field(strict=True)] | Literal["last"] = Field(
         default="last", description="'last', or the number of a frame of a dump, from 0"
     )
-    box: tuple[Positive, Positive] | None = Field(default=None, description="two positive edge lengths, of a CSV file")
-    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, of a CSV file")
+    box: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=3)] | None = Field(
+        default=None, description="two or three positive edge lengths, of a CSV file"
+    )
+    periodic: Word | None = Field(default=None, description="a combination of the letters x, y, z, of a CSV file")
 
 
 def _made_or_read(packing: object) -> str:
@@ -61,6 +63,8 @@ class WallsTable(StudyTable):
     right: Wall | None = Field(default=None, description=A_WALL)
     bottom: Wall | None = Field(default=None, description=A_WALL)
     top: Wall | None = Field(default=None, description=A_WALL)
+    front: Wall | None = Field(default=None, description=f"{A_WALL}, at z = 0")
+    back: Wall | None = Field(default=None, description=f"{A_WALL}, at the far end of z")
 
     def conditions(self) -> dict[str, WallCondition]:
         """The conditions by wall."""
@@ -97,7 +101,9 @@ class Gradient(StudyTable):
     """A temperature that varies linearly: ``value`` at the origin, ``gradient`` [K/m]."""
 
     value: Number = Field(description=f"{NUMBER} [K]")
-    gradient: tuple[Number, Number] = Field(description=f"two numbers [K/m], each {NUMBER}")
+    gradient: Annotated[tuple[Number, ...], Field(min_length=2, max_length=3)] = Field(
+        description=f"two or three numbers [K/m], one per axis, each {NUMBER}"
+    )
 
 
 class Source(StudyTable):
@@ -107,23 +113,39 @@ class Source(StudyTable):
     particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
         default=None, description="a list of whole numbers from 0, the rows of particles; all by default"
     )
+    ids: Annotated[list[Annotated[int, Field(strict=True)]], SOME] | None = Field(
+        default=None, description="a list of whole numbers, the ids of particles in their file"
+    )
+    types: Annotated[list[int | Word], SOME] | None = Field(
+        default=None, description="a list of types of particles, as their file names them"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Source:
+        given = [key for key in ("particles", "ids", "types") if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise ValueError(f"{given[0]} and {given[1]} both choose particles, take one of them out")
+        return self
 
 
 class ParticlesTable(StudyTable):
     """``[particles]``: what they are made of, and how warm they are at first; a number, or one for each particle."""
 
     conductivity: Positive = Field(default=1.0, description=f"{POSITIVE} [W/(m K)]")
+    types: dict[str, Positive] | None = Field(
+        default=None, description="a table such as { 1 = 2.4, 2 = 1.1 }: conductivity by type of the file [W/(m K)]"
+    )
     heat_capacity: Annotated[
         Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], SOME, Tag(AS_LIST)], WRITTEN
     ] = Field(description=f"{POSITIVE}, or a list of such, one for each particle: rho c [J/(m3 K)]")
     initial: Annotated[
-        Annotated[Number, Tag(AS_NUMBER)]
+        Annotated[Number | Literal["file"], Tag(AS_NUMBER)]
         | Annotated[list[Number], SOME, Tag(AS_LIST)]
         | Annotated[Gradient, Tag(AS_TABLE)],
         WRITTEN,
     ] = Field(
-        description=f"{NUMBER} [K], a list of such, one for each particle, or a table such as "
-        "{ value = 0.0, gradient = [1.0, 0.0] }"
+        description=f"{NUMBER} [K], a list of such, one for each particle, a table such as "
+        "{ value = 0.0, gradient = [1.0, 0.0] }, or 'file': the temperatures of the particle file"
     )
 
 
@@ -156,7 +178,7 @@ class Time(StudyTable):
 
 
 def refuse_endless(time: Time, times: Sequence[float] | NDArray[np.float64]) -> None:
-    """Refuse steps that no run lives to see.
+    """Refuse more steps than a run can take.
 
     Raises
     ------
@@ -199,8 +221,8 @@ class NetworkStudy(StudyFile):
     @model_validator(mode="after")
     def _check(self) -> NetworkStudy:
         if isinstance(self.packing, PackingTable):
-            if len(self.packing.box) != 2 or isinstance(getattr(self.packing, "density", None), tuple):
-                raise ValueError("[packing] makes one packing: a box of two lengths, and one density")
+            if isinstance(getattr(self.packing, "density", None), tuple):
+                raise ValueError("[packing] makes one packing: give one density")
             if self.seed is None:
                 raise ValueError("seed: [packing] draws random numbers, give a whole number")
         if self.motion is None and not self.time.times:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.durable.files import replacing
-from etc_engine.errors import OutputError
 from etc_engine.realization import Status
 from etc_engine.study.conditions import derived_conductivities
 from etc_engine.study.quantities import QUANTITIES
@@ -101,11 +98,15 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
         "direction_i": ("direction_i", axes, {"long_name": "direction of the flux"}),
         "direction_j": ("direction_j", axes, {"long_name": "direction of the gradient"}),
     }
+    for name, (held, meaning) in study.realization_coordinates().items():
+        kind = object if isinstance(held[0], str) else np.int64
+        found[name] = ("realization", np.array(held, dtype=kind), {"long_name": meaning})
     for name, values in study.quantities.items():
         several = name in study.axes
-        found[name] = (name if several else (), np.array(values if several else values[0]), QUANTITIES[name].attributes)
+        attributes = QUANTITIES[name].attributes(study.box.dimension)
+        found[name] = (name if several else (), np.array(values if several else values[0]), attributes)
     for name, (dims, derived) in derived_conductivities(study).items():
-        found[name] = (dims, derived, {**QUANTITIES[name].attributes, "comment": DERIVED})
+        found[name] = (dims, derived, {**QUANTITIES[name].attributes(study.box.dimension), "comment": DERIVED})
     return found
 
 
@@ -177,21 +178,6 @@ def _status_attributes() -> dict[str, Any]:
     }
 
 
-def write_dataset(dataset: xarray.Dataset, output: Path) -> None:
-    """Write a dataset as netCDF-4, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written; nothing is left behind then.
-    """
-    try:
-        with replacing(output) as temporary:
-            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
-    except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as RuntimeError
-        raise OutputError(f"cannot write {output}: {error}; the finished units are safe in its shards") from None
-
-
 def differing_variables(one: xarray.Dataset, other: xarray.Dataset) -> list[str]:
     """Names of the variables in which two datasets do not have the same bits.
 
@@ -212,30 +198,3 @@ def same_bits(one: xarray.Dataset, other: xarray.Dataset, name: str) -> bool:
     if a.dtype.kind not in "biuf":  # words, in whatever way they are held
         return bool(a.ravel().tolist() == b.ravel().tolist())
     return bool(a.dtype == b.dtype and a.tobytes() == b.tobytes())
-
-
-def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
-    """NaN is what a missing number is; integers have none, and no attribute should say so."""
-    return {str(name): {"_FillValue": None} for name, values in dataset.variables.items() if values.dtype.kind != "O"}
-
-
-def open_dataset(path: Path) -> xarray.Dataset:
-    """The dataset in a file, loaded and closed.
-
-    Raises
-    ------
-    OutputError
-        If the file is missing or is not the result of a sweep.
-    """
-    import xarray
-
-    try:
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
-            dataset = stored.load()
-    except OSError as error:
-        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
-    except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
-        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
-    if "study_digest" not in dataset.attrs:
-        raise OutputError(f"{path} is not the result of a sweep: it has no attribute study_digest")
-    return dataset

@@ -148,7 +148,7 @@ def march_trajectory(
     Parameters
     ----------
     trajectory : Trajectory
-        Two-dimensional.
+        Of disks or spheres.
     contacts : callable
         packing -> contact network, such as `etc_engine.medium.network.overlap_contacts`.
     build : callable
@@ -167,7 +167,7 @@ def march_trajectory(
     restart : MovingState, optional
         A state of the same run, to go on from; the other arguments are still those of the start.
     progress : callable, optional
-        Told the time after every step.
+        Called with the time after every step.
 
     Yields
     ------

@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 
 from etc_engine import effective_conductivity
 from etc_engine.engines.pipe.steady import pipe_conductivity
-from etc_engine.engines.pipe.transient import PipeTransient
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import overlap_contacts
+from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
@@ -31,12 +31,8 @@ SETTLED = 8.0
 SHOWN = (0.0, 4.0, 24.0)
 
 
-def pipes(network: ContactNetwork, capacities: np.ndarray) -> PipeTransient:
-    return transient_system(
-        medium_of(network, heat_capacity=capacities / network.cut_measures(prescribed=True)),
-        WALLS,
-        engine="pipe",
-    )
+def pipes(network: ContactNetwork, capacities: np.ndarray) -> ParticleSystem:
+    return transient_system(medium_of(network), WALLS, engine="pipe", capacities=capacities)
 
 
 def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:

@@ -169,7 +169,7 @@ def test_a_warning_signal_stops_early_and_says_so(tmp_path):
     _, errors = running.communicate(timeout=60)
     assert running.returncode == 75
     assert "stopped early (SIGTERM): " in errors
-    assert "go on with --resume" in errors
+    assert "continue with --resume" in errors
 
 
 def test_another_study_does_not_go_on_from_these_states(etc_engine, tmp_path):
@@ -284,7 +284,8 @@ def test_times_of_a_picture_share_the_way_evenly():
         ("value = 1.0", "valeu = 1.0", "walls.left.valeu: unknown key, did you mean 'value'? allowed: type, value"),
         ("times = [0.0, 1.0], values", "time = [0.0, 1.0], values", "walls.right.value.time: unknown key, did you"),
         ("values = [0.0, 0.5]", "values = [0.0, 'x']", "walls.right.value.values[1]: found 'x', allowed: a list"),
-        ("gradient = [0.0, 0.2]", "gradient = [0.0]", "particles.initial.gradient[1]: missing, expected two numbers"),
+        ("gradient = [0.0, 0.2]", "gradient = [0.0]", "gradient: found [0.0], allowed: two or three numbers [K/m]"),
+        ("gradient = [0.0, 0.2]", "gradient = [0.0, 0.2, 0.1]", "gradient: expected 2 numbers, found 3"),
         ('top = { type = "insulated" }', "top = 5", "walls.top: found 5, allowed: a table such as"),
         ('type = "insulated"', 'type = "insulated", value = 1.0', "walls.top: value: has no meaning with type"),
         ('type = "insulated"', 'type = "insulated", coefficient = 1.0', "walls.top: coefficient: has no meaning"),

@@ -13,7 +13,8 @@ from serving import STUDY, Service, ask, renamed, until
 from etc_engine.comparison import simulated
 from etc_engine.errors import InputError, OutputError
 from etc_engine.service import client
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 PARTICLES = b"x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n"
 
@@ -123,10 +124,10 @@ def test_the_report_is_a_page_that_may_run_nothing(real, finished):
     [
         ({"box": "1,1"}, ["--box", "1,1"]),
         ({"box": "1,1", "contact_angle": 5}, ["--box", "1,1", "--contact-angle", "5"]),
-        ({"box": "1,1", "method": "pipe"}, ["--box", "1,1", "--method", "pipe"]),
+        ({"box": "1,1", "engine": "pipe"}, ["--box", "1,1", "--engine", "pipe"]),
         (
-            {"box": "1,1", "method": "pipe", "pipe_resistance": "uniform"},
-            ["--box", "1,1", "--method", "pipe", "--pipe-resistance", "uniform"],
+            {"box": "1,1", "engine": "pipe", "method": "uniform"},
+            ["--box", "1,1", "--engine", "pipe", "--method", "uniform"],
         ),
     ],
 )
@@ -152,7 +153,7 @@ def test_a_dump_brings_its_box(service):
     [
         (PARTICLES, {}, "--box is missing"),
         (PARTICLES, {"box": "1,1", "method": "magic"}, "magic"),
-        (b"x,y\n1,2\n", {"box": "1,1"}, "upload has the header 'x,y'"),
+        (b"x,y\n1,2\n", {"box": "1,1"}, "upload has neither a radius nor a diameter column"),
         (b"x,y,radius\n0.5,0.5,much\n", {"box": "1,1"}, "upload, line 2: radius is not a number: 'much'"),
         (b"\x89HDF\r\n\x1a\n", {}, "another format"),
         (b"", {"box": "1,1"}, "header"),

@@ -170,11 +170,11 @@ def test_a_load_that_drives_nothing_has_no_energy(axis):
 def test_the_bits_do_not_depend_on_the_number_of_threads():
     script = """
 import numpy as np
-from etc_engine import Box, PackingSpec, bonded_contacts, pack, parse_radii
+from etc_engine import Box, PackingSpec, bonded_contacts, medium_of, pack, parse_radii
 from etc_engine.engines.dtem.angle_curve import solve_angle_curve
 spec = PackingSpec("advancing-front", parse_radii("uniform:0.006:0.012"), Box((1.0, 1.0)), radius_growth=False)
 network = bonded_contacts(pack(spec, np.random.default_rng(313)), 0.1)
-for index, solution in solve_angle_curve(network, (0,), [0.02, 0.05, 0.1, 0.15, 0.2]):
+for index, solution in solve_angle_curve(medium_of(network), (0,), [0.02, 0.05, 0.1, 0.15, 0.2]):
     print(index, solution.snapshots, solution.energies.item().hex())
 """
     answers = []

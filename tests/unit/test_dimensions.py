@@ -16,9 +16,10 @@ from etc_engine.realization import Outcome, Realization, Status
 from etc_engine.service.curve import curve_of
 from etc_engine.study.quantities import QUANTITIES, SWEPT
 from etc_engine.study.sweep import parse_study
-from etc_engine.sweep.dataset import assemble, open_dataset
+from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.plan import Unit, next_targets
 from etc_engine.sweep.records import Record, decode, encode
+from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.table import tabulate
 
 SPACE = """
@@ -149,7 +150,7 @@ def test_figures_of_many_dimensions_have_a_panel_per_combination(made_sweep):
 
     over = evaluate_models(made_sweep(text, fixed))
     figure = draw_comparison(over, model_lines(over))
-    assert figure.axes[0].get_xlabel() == "thermal resistance of a contact [K/W]"
+    assert figure.axes[0].get_xlabel() == "thermal resistance of a contact [m K/W]"
 
 
 def test_adaptive_rounds_follow_the_noisiest_cell_of_all():

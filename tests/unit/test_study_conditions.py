@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from etc_engine import Medium, effective_conductivity
+from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.errors import StudyError
-from etc_engine.materials import find_solid
+from etc_engine.materials import find_solid, gas_state, jump_length
 from etc_engine.medium.conditions import Conditions, pores_at
 from etc_engine.medium.rules import find_rule
+from etc_engine.models import evaluate
 from etc_engine.packing import pack
 from etc_engine.realization.realize import realize
 from etc_engine.study.conditions import derived_conductivities
@@ -165,3 +167,31 @@ def test_rough_contacts_conduct_less():
     found = realize(parse_study(rough).realization_spec(0.85), np.random.default_rng(1)).cells
     traces = [np.trace(outcome.conductivity) for outcome in (smooth, *found)]
     assert traces[0] > traces[1] > traces[2] > 0.0
+
+
+def test_bed_models_take_their_inputs_from_the_result(made_sweep):
+    """100 spheres of density 0.5 in (2 mm)^3; helium of the given accommodation."""
+    pytest.importorskip("CoolProp")
+    text = BED.replace('gas = "helium"', 'gas = "helium"\naccommodation = 0.4')
+    data = made_sweep(text, lambda *_: 1.0)
+    comparison = evaluate_models(data)
+    diameter = (6.0 * 0.5 * 8e-9 / (100 * np.pi)) ** (1.0 / 3.0)
+    gas = gas_state("helium", 800.0, 1e3)
+    expected = evaluate(
+        "zehner_bauer_schluender",
+        k1=gas.conductivity,
+        k2=float(find_solid("alumina").conductivity.at(800.0)),
+        fraction=0.5,
+        dimension=3,
+        diameter=diameter,
+        temperature=800.0,
+        emissivity=0.6,
+        jump_length=jump_length(gas, 0.4),
+    )
+    found = comparison["model_conductivity"].sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
+    assert found.values.item() == pytest.approx(float(expected), rel=1e-12)
+    assert comparison["input_diameter"].values.item() == pytest.approx(diameter, rel=1e-12)
+    assert not comparison.attrs["bounds_bind"]
+    lines = model_lines(comparison)["model_conductivity"]
+    at = lines.sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
+    assert at.values.ravel()[0] == pytest.approx(float(expected), rel=1e-12)

@@ -21,6 +21,7 @@ from etc_engine.medium.backbone import Backbone
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.sides import check_arcs
 from etc_engine.solvers import FamilySolution, Member, TrialSpace, solve_family
+from etc_engine.solvers.summation import inner
 
 TOLERANCE = 1e-8
 """Largest estimated relative error of a conductivity of a reduced solution."""
@@ -121,7 +122,7 @@ def _without_unknowns(load: ElementGeometry, half_angle: float) -> FamilySolutio
     member = _member(load, half_angle)
     if member is None:
         return None
-    energies = load.lift.T @ member.apply(load.lift)
+    energies = inner(load.lift, member.apply(load.lift))
     return FamilySolution(np.empty((0, len(energies))), energies, 0.0, True, 0, 0, time.perf_counter() - start)
 
 

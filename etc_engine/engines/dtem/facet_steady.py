@@ -26,6 +26,7 @@ from etc_engine.medium.facets import FacetLinks
 from etc_engine.medium.loads import driven_walls, wall_temperatures
 from etc_engine.solvers import SolveReport, solve_loads
 from etc_engine.solvers.star import star_preconditioner
+from etc_engine.solvers.summation import inner
 
 LOOSE = 0.52
 """Density below which gaps are wide."""
@@ -188,7 +189,7 @@ def solve_sides(
     u, reports = _solve(system, elements, h.values, initial, tolerance)
     temperatures = system.element_temperatures(elements, u)
     flows = elements.apply(temperatures)
-    energies = temperatures.T @ flows
+    energies = inner(temperatures, flows)
     solution = FacetSolution(links, axes, sides, material, h, temperatures, flows, energies, reports)
     return solution, elements
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from etc_engine.engines.dtem import conductivity as elements
 from etc_engine.engines.dtem import facet_medium as sphere_facets
 from etc_engine.engines.dtem.cell import medium as disk_cells
 from etc_engine.engines.dtem.cell.transient import cell_system
+from etc_engine.engines.dtem.cell_3d import medium as sphere_cells
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.transient import element_system
+from etc_engine.errors import InputError
 from etc_engine.medium.conduction import Conduction, Result
 from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.field import ParticleField
@@ -33,12 +35,15 @@ class Family:
         (method, result) -> what a user should know about the accuracy of a result.
     system : callable, optional
         (medium, walls, method=, source=, capacities=, options) -> ParticleSystem.
+    foreign : mapping
+        Options of the method that belong to the other dimension, with the values that say nothing.
     """
 
     solve: Callable[[Sequence[Medium], Conduction], list[Result]]
     recover: Callable[[Medium, Any, int], ParticleField]
     remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
     system: Callable[..., ParticleSystem] | None = None
+    foreign: Mapping[str, Any] = field(default_factory=dict)
 
 
 CONTACTS = Family(
@@ -50,7 +55,16 @@ CONTACTS = Family(
 """Elements whose nodes are the contacts; heat takes no other way."""
 
 FAMILIES: Mapping[tuple[str, int], Family] = {
-    ("cell", 2): Family(disk_cells.solve_series, disk_cells.disk_field, disk_cells.accuracy_remarks, cell_system),
+    ("cell", 2): Family(
+        disk_cells.solve_series, disk_cells.disk_field, disk_cells.accuracy_remarks, cell_system, {"frame": None}
+    ),
+    ("cell", 3): Family(
+        sphere_cells.solve_series,
+        sphere_cells.sphere_field,
+        sphere_cells.accuracy_remarks,
+        sphere_cells.sphere_system,
+        {"degree": 3, "bounds": False},
+    ),
     ("facets", 3): Family(
         sphere_facets.solve_series,
         sphere_facets.sphere_field,
@@ -67,8 +81,20 @@ def family_of(method: str, dimension: int) -> Family:
 
 
 def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
-    """Effective conductivity of media on one packing, one result per medium."""
-    return family_of(conduction.method, media[0].dimension).solve(media, conduction)
+    """Effective conductivity of media on one packing, one result per medium.
+
+    Raises
+    ------
+    InputError
+        If an option belongs to the other dimension.
+    """
+    dimension = media[0].dimension
+    family = family_of(conduction.method, dimension)
+    for name, neutral in family.foreign.items():
+        if conduction.options.get(name, neutral) != neutral:
+            raise InputError(f"option {name} means nothing to method {conduction.method} in {dimension}D: leave it out")
+    own = {name: value for name, value in conduction.options.items() if name not in family.foreign}
+    return family.solve(media, replace(conduction, options=own))
 
 
 def field_of(medium: Medium, method: str, solution: Any, load: int) -> ParticleField:

@@ -110,7 +110,7 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
         return sphere_error_estimate(solution.sides, kappa, solution.heat_flows[:, load], energy)
     parts = np.multiply(COEFFICIENTS, chord_error_terms(solution, load)) * [1.0, 1.0, -1.0]
     flows = np.abs(solution.heat_flows[:, load])
-    rest = LEAST * (flows @ np.sin(solution.sides.alpha) ** 4) / max(float(flows.sum()), np.finfo(float).tiny)
+    rest = LEAST * (flows * np.sin(solution.sides.alpha) ** 4).sum() / max(float(flows.sum()), np.finfo(float).tiny)
     return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest)
 
 

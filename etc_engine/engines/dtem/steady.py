@@ -15,6 +15,7 @@ from etc_engine.medium.medium import Medium, check_conductors
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import NO_CUTS, ContactSides, check_arcs, contact_sides, insulated_cuts
 from etc_engine.solvers import SolveReport, solve_loads
+from etc_engine.solvers.summation import inner
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +193,7 @@ def solve_steady(
         method=method,
         temperatures=temperatures[:: made.modes],
         flows=flows.reshape(made.sides.nodes.size, made.modes, len(axes)),
-        energies=temperatures.T @ flows,
+        energies=inner(temperatures, flows),
         reports=reports,
         positive_off_diagonals=count_positive_off_diagonals(system.matrix),
     )

@@ -151,7 +151,7 @@ def _axis(comparison: xarray.Dataset) -> _Axis:
         label = f"{measure} fraction of the particles [-]" if conducting else DENSITY.format(measure=measure)
         curves = next((dim for dim in same if dim != "method"), None)
     else:
-        label = heading_of(across)
+        label = heading_of(across, comparison[across].attrs)
         curves = "method" if "method" in same else next(iter(same), None)
     return _Axis(across, label, curves, tuple(dim for dim in dims if dim not in ("density", across, curves)))
 

@@ -20,7 +20,8 @@ PIXELS = 700
 TOWARDS = np.array([1.0, -1.35, 0.75]) / np.linalg.norm([1.0, -1.35, 0.75])
 """Direction from the bed to the eye."""
 LIGHT = np.array([0.25, -0.75, 0.6]) / np.linalg.norm([0.25, -0.75, 0.6])
-COLOURS = colormaps["inferno"]
+COLOURS = colormaps["inferno"].with_extremes(bad="0.75")
+"""Grey where no heat arrives."""
 
 
 def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
@@ -46,11 +47,12 @@ def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
     shown = left.imshow(image, extent=(0, width, 0, height), origin="lower", cmap=COLOURS, norm=scale)
     left.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", aspect="equal", facecolor="0.9")
     left.set_title(f"slice at {AXES[normal]} = {0.5 * packing.box.lengths[normal]:.3g} m", fontsize=9)
-    view, frame = draw_view(packing, COLOURS(scale(field.particle_temperatures)), PIXELS)
-    right.imshow(view, extent=frame, interpolation="bilinear")
+    view, frame = draw_view(packing, COLOURS(scale(np.ma.masked_invalid(field.particle_temperatures))), PIXELS)
+    right.imshow(view, extent=frame, interpolation="bilinear", zorder=2)
     _draw_edges(right, packing)
+    right.margins(0.04)
     right.set_axis_off()
-    right.set_title("mean temperature of each sphere", fontsize=9)
+    right.set_title("mean temperature of each sphere", fontsize=9, pad=14)
     figure.colorbar(shown, ax=[left, right], label="temperature [K]", shrink=0.85)
     figure.suptitle(caption, fontsize=10)
     figure.savefig(path, dpi=150, bbox_inches="tight")
@@ -208,6 +210,6 @@ def _draw_edges(axes: Axes, packing: ParticlePacking) -> None:
         other[axis] = lengths[axis] - back[axis]
         ends = np.stack([back, other]) @ screen.T
         style = "--" if packing.box.periodic[axis] else "-"
-        axes.plot(*ends.T, style, color="0.35", linewidth=1.0, zorder=0)
+        axes.plot(*ends.T, style, color="0.35", linewidth=1.0, zorder=1)
         outwards = ends[1] + 0.04 * (ends[1] - ends[0])
         axes.text(float(outwards[0]), float(outwards[1]), AXES[axis], fontsize=9, ha="center", va="center")

@@ -6,10 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from etc_engine.box import Box, parse_periodic
 from etc_engine.output.figures.canvas import COLOURS, INK, new_figure, save, style
+from etc_engine.output.figures.spheres import draw_view
+from etc_engine.packing.particles import ParticlePacking
 
 if TYPE_CHECKING:
     import xarray
@@ -41,7 +46,7 @@ def save_transient(series: xarray.Dataset, path: Path | str) -> None:
 
 def draw_transient(series: xarray.Dataset) -> Figure:
     """Figure of a transient: a row of packings, and below it the walls' heat flows and the mean temperature."""
-    width, height = series.attrs["box"]
+    width, height = view_size(series)
     shown = pick_times(series["mean_temperature"].values, PANELS)
     panel = 11.0 / PANELS
     row = min(max(panel * height / width, LOWEST), 6.0)
@@ -60,7 +65,7 @@ def draw_transient(series: xarray.Dataset) -> Figure:
     if flows.lines:
         flows.legend(frameon=False, fontsize=9)
     flows.axhline(0.0, color=INK, linewidth=0.6)
-    flows.set(xlabel="time [s]", ylabel="heat flow into the particles [W/m]")
+    flows.set(xlabel="time [s]", ylabel=f"heat flow into the particles [{'W' if 'z' in series else 'W/m'}]")
     temperature = series["temperature"].values
     means.fill_between(
         time,
@@ -99,13 +104,37 @@ def pick_times(means: np.ndarray, count: int) -> list[int]:
     return sorted({0, *picked[1:-1], means.size - 1})
 
 
+def view_size(series: xarray.Dataset) -> tuple[float, float]:
+    """Width and height of a drawn packing: the box of disks, or a view of spheres."""
+    if "z" in series:
+        return 1.0, 1.0
+    width, height = series.attrs["box"]
+    return float(width), float(height)
+
+
+def _draw_spheres(axes: Any, series: xarray.Dataset, low: float, high: float) -> Any:
+    """A view of the bed at one time; returns what a colour bar needs."""
+    box = Box(tuple(series.attrs["box"]), parse_periodic(series.attrs["periodic"], 3))
+    centers = np.stack([series[axis].values for axis in "xyz"], axis=1)
+    scale = ScalarMappable(Normalize(low, high), "inferno")
+    colours = scale.to_rgba(series["temperature"].values)
+    image, frame = draw_view(ParticlePacking(centers, series["radius"].values, box), np.asarray(colours), 400)
+    axes.imshow(image, extent=frame, interpolation="bilinear")
+    axes.set_axis_off()
+    return scale
+
+
 def _draw_packings(figure: Any, series: xarray.Dataset, shown: list[int]) -> None:
     """Particles at some times, all in one scale of temperatures."""
-    width, height = series.attrs["box"]
+    width, height = view_size(series)
     temperature = series["temperature"].values
     low, high = float(temperature.min()), float(temperature.max())
     panels = figure.subplots(1, len(shown), squeeze=False)[0]
     for axes, k in zip(panels, shown, strict=True):
+        axes.set_title(f"t = {series['time'].values[k]:.4g} s", fontsize=10)
+        if "z" in series:
+            disks = _draw_spheres(axes, series.isel(time=k), low, high if high > low else low + 1.0)
+            continue
         place = series.isel(time=k)[["x", "y", "radius"]]
         radii, centers = place["radius"].values, np.stack([place["x"].values, place["y"].values], axis=1)
         disks = EllipseCollection(
@@ -123,6 +152,5 @@ def _draw_packings(figure: Any, series: xarray.Dataset, shown: list[int]) -> Non
         disks.set_clim(low, high if high > low else low + 1.0)
         axes.add_collection(disks)
         axes.set(xlim=(0, width), ylim=(0, height), aspect="equal", xticks=[], yticks=[])
-        axes.set_title(f"t = {series['time'].values[k]:.4g} s", fontsize=10)
     bar = figure.colorbar(disks, ax=list(panels), shrink=0.85, aspect=25, pad=0.01)
     bar.set_label("mean temperature [K]", fontsize=9)

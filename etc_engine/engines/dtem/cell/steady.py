@@ -5,18 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from etc_engine.engines.dtem.cell.assembly import CellMaterials, CellSystem, assemble_cells
 from etc_engine.engines.dtem.cell.frame import Frame
 from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution, divide
 from etc_engine.engines.dtem.cell.rim_grid import EdgeGrid
-from etc_engine.solvers import SolveReport, build_preconditioner, solve_energy
+from etc_engine.errors import ConvergenceError
+from etc_engine.solvers import SolveReport, build_preconditioner, solve_loads
 
 Floats = NDArray[np.float64]
 
-EXACT_LEVEL = 4000
-"""Frames of at most so many unknowns are factorised; larger ones go through multigrid."""
+EXACT_LEVEL = 20_000
+"""Frames of at most so many unknowns are factorised; larger ones go through multigrid, and only if it fails too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,23 +157,47 @@ def solve_model(model: CellModel, axes: tuple[int, ...], *, tolerance: float = 1
         loads = system.matrix @ fluctuations
         lift = fluctuations.T @ loads
     free = np.flatnonzero(~held)
-    reports = []
+    reports: tuple[SolveReport, ...] = (SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0),) * len(axes)
     if free.size:
-        matrix = system.matrix[free][:, free]
-        preconditioner = build_preconditioner(matrix, EXACT_LEVEL)
-        for load in range(len(axes)):
-            u, report = solve_energy(
-                matrix,
-                np.ascontiguousarray(-loads[free, load]),
-                float(lift[load, load]),
-                preconditioner=preconditioner,
-                tolerance=tolerance,
-            )
-            fluctuations[free, load] = u
-            reports.append(report)
+        matrix = _free_part(system.matrix, held)
+        rhs, lifts = -loads[free], np.diag(lift)
+        try:
+            preconditioner = build_preconditioner(matrix, EXACT_LEVEL)
+            u, reports = solve_loads(matrix, rhs, lifts, preconditioner=preconditioner, tolerance=tolerance)
+        except ConvergenceError:  # a contrast so high that multigrid stalls
+            preconditioner = build_preconditioner(matrix, free.size)
+            u, reports = solve_loads(matrix, rhs, lifts, preconditioner=preconditioner, tolerance=tolerance)
+        fluctuations[free] = u
     lifted = fluctuations.T @ (system.matrix @ fluctuations)
     if model.geometry.box.periodic[axes[0]]:
         cross = fluctuations.T @ loads
         lifted = lift + cross + cross.T + lifted
-    nothing = SolveReport(0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return CellSolution(model, axes, fluctuations, lifted, tuple(reports) or (nothing,) * len(axes))
+    return CellSolution(model, axes, fluctuations, lifted, reports)
+
+
+def _free_part(matrix: csr_matrix, held: NDArray[np.bool_]) -> csr_matrix:
+    """Rows and columns of a matrix that are not held."""
+    number = np.where(held, -1, np.cumsum(~held) - 1)
+    data, indices, indptr = _select(matrix.data, matrix.indices, matrix.indptr, number)
+    return csr_matrix((data, indices, indptr), shape=(indptr.size - 1,) * 2)
+
+
+@njit(cache=True)
+def _select(data, indices, indptr, number):  # type: ignore[no-untyped-def]
+    """Entries whose row and column have a new number, in one pass without a second copy."""
+    starts = np.zeros(number.max() + 2, dtype=indptr.dtype)
+    for row in range(number.size):
+        if number[row] >= 0:
+            for entry in range(indptr[row], indptr[row + 1]):
+                starts[number[row] + 1] += number[indices[entry]] >= 0
+    for row in range(starts.size - 1):
+        starts[row + 1] += starts[row]
+    kept, columns = np.empty(starts[-1]), np.empty(starts[-1], dtype=indices.dtype)
+    place = 0
+    for row in range(number.size):
+        if number[row] >= 0:
+            for entry in range(indptr[row], indptr[row + 1]):
+                if number[indices[entry]] >= 0:
+                    kept[place], columns[place] = data[entry], number[indices[entry]]
+                    place += 1
+    return kept, columns, starts

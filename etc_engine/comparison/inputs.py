@@ -1,0 +1,72 @@
+"""What the result of a sweep knows of the further inputs of a model: sizes, contacts, temperature, gas, radiation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from etc_engine.comparison.simulation import current_study
+from etc_engine.materials import accommodation_from_masses, find_solid, gas_state, jump_length
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
+    """Inputs of models by name, each on those dimensions of the sweep that vary it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of a sweep.
+
+    Returns
+    -------
+    dict of DataArray
+        ``diameter`` [m]: of the sphere (disk) of the mean volume (area). ``coordination``: mean over realizations.
+        ``temperature`` [K], ``emissivity`` and ``jump_length`` [m] of one surface where the study says them; an
+        emissivity of 0 beside a gas without radiation.
+    """
+    import xarray
+
+    study = current_study(dataset)
+    found: dict[str, xarray.DataArray] = {}
+    size, dimension = np.prod(study["packing"]["box"]), dataset.sizes["direction_i"]
+    particles = dataset["particles"].where(dataset["particles"] > 0)
+    mean_size = (dataset["packing_density"] * float(size) / particles).mean("realization")
+    found["diameter"] = 2.0 * (mean_size / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension)
+    found["coordination"] = 2.0 * (dataset["contacts"] / particles).mean("realization")
+    for name in ("temperature", "emissivity"):
+        if name in dataset.coords:
+            found[name] = dataset[name].reset_coords(drop=True)
+    if "temperature" in found and "emissivity" not in found:
+        found["emissivity"] = xarray.DataArray(0.0)
+    jumps = _jump_length(study, dataset)
+    if jumps is not None:
+        found["jump_length"] = jumps
+    return found
+
+
+def _jump_length(study: dict[str, Any], dataset: xarray.Dataset) -> xarray.DataArray | None:
+    """Jump length of one surface at every temperature and pressure; infinite in vacuum."""
+    import xarray
+
+    gas, material = study["pores"].get("gas"), study["particles"].get("material")
+    given = dataset["accommodation"] if "accommodation" in dataset.coords else None
+    if gas is None or (given is None and material is None):
+        return None
+    accommodation = xarray.DataArray(np.nan) if given is None else given
+    names = ("temperature", "pressure")
+    conditions = [dataset[name].reset_coords(drop=True) for name in names]
+    t, p, a = xarray.broadcast(*conditions, accommodation.reset_coords(drop=True))
+    values = np.full(t.shape, np.inf)
+    for place in np.ndindex(t.shape):
+        if p.values[place] > 0.0:
+            state = gas_state(gas, float(t.values[place]), float(p.values[place]))
+            value = float(a.values[place])
+            mass = None if material is None else find_solid(material).atomic_mass
+            if np.isnan(value):
+                value = 1.0 if mass is None else min(accommodation_from_masses(mass, state), 1.0)
+            values[place] = jump_length(state, value)
+    return t.copy(data=values)
