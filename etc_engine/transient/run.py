@@ -27,7 +27,7 @@ from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
 from etc_engine.study.transient import FileTable, Gradient, NetworkStudy, refuse_endless
 from etc_engine.study.walls import plain
-from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
+from etc_engine.transient.moving import MovingState, Stepping, ThermalExpansion, march_trajectory, named_frame
 from etc_engine.transient.states import State, claimed_states, write_state
 
 Progress = Callable[[float], None]
@@ -180,6 +180,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, first.count, trajectory.conductivity)
 
+    told = _fraction(progress, trajectory.times[0], trajectory.times[-1])
+
     def contacts(packing: ParticlePacking) -> ContactNetwork:
         return _contacts(study, packing)
 
@@ -192,11 +194,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
             _initial(study, first),
             heat_capacity=np.asarray(study.particles.heat_capacity, dtype=np.float64),
             expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
-            scheme=time.scheme,
-            steps=time.steps or 1,
-            tolerance=time.tolerance,
+            stepping=Stepping(time.scheme, time.steps or 1, time.tolerance, progress=told),
             restart=restart,
-            progress=_fraction(progress, trajectory.times[0], trajectory.times[-1]),
         )
 
     refuse_endless(time, trajectory.times)
