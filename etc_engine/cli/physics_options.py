@@ -16,7 +16,10 @@ if TYPE_CHECKING:
     from etc_engine.packing.particles import ParticlePacking
 
 OPTIONS = (
-    click.option("--rule", help="Contact rule: overlap, bonded, hertz or load; by default what the options fit."),
+    click.option(
+        "--rule", help="Contact rule: overlap, bonded, radius, hertz or load; by default what the options fit."
+    ),
+    click.option("--contact-radius", type=float, help="Radius of bonded contacts [m], instead of --contact-angle."),
     click.option("--youngs-modulus", type=float, help="Young's modulus of the particles [Pa]."),
     click.option("--poisson-ratio", type=float, help="Poisson's ratio of the particles."),
     click.option(
@@ -40,6 +43,7 @@ OPTIONS = (
 NEEDED: dict[str, tuple[str, ...]] = {
     "overlap": (),
     "bonded": ("contact_angle",),
+    "radius": ("contact_radius",),
     "coordination": ("contact_angle", "coordination"),
     "hertz": (),
     "softened": ("youngs_modulus", "poisson_ratio"),
@@ -53,6 +57,7 @@ class PhysicsWords:
     """What the options say of contacts, solid and pores."""
 
     rule: str | None = None
+    contact_radius: float | None = None
     youngs_modulus: float | None = None
     poisson_ratio: float | None = None
     simulated_modulus: float | None = None
@@ -133,8 +138,10 @@ class PhysicsWords:
 
     @property
     def contact_rule(self) -> str | None:
-        """The rule asked for; ``load`` if only a load is given."""
-        return "load" if self.rule is None and self.load is not None else self.rule
+        """The rule asked for; ``radius`` or ``load`` if only a contact radius or a load is given."""
+        if self.rule is not None:
+            return self.rule
+        return "radius" if self.contact_radius is not None else "load" if self.load is not None else None
 
     def network(self, packing: ParticlePacking, half_angle: float | None, bond_gap: float) -> ContactNetwork:
         """Contacts by the rule asked for.
@@ -151,6 +158,7 @@ class PhysicsWords:
         rule = find_rule(word)
         values = {
             "contact_angle": half_angle,
+            "contact_radius": self.contact_radius,
             "youngs_modulus": self.youngs_modulus,
             "poisson_ratio": self.poisson_ratio,
             "simulated_modulus": self.simulated_modulus,

@@ -157,6 +157,8 @@ def _foretell(study: Path, output: Path, communicator: Communicator, realize: Re
         click.echo(f"          at most about {found.seconds(found.most_units - found.finished):.3g} s")
     click.echo(f"memory    {found.rank_bytes / 1e6:.0f} MB per rank")
     click.echo(f"disk      {found.shard_bytes / 1e6:.2g} MB of shards, {found.dataset_bytes / 1e6:.2g} MB of result")
+    for packing in found.packings:
+        click.echo(f"packing   {packing}")
     for remark in found.remarks:
         click.echo(f"probe     {remark}")
     return 0

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import xarray
 
     from etc_engine.study.transient import NetworkStudy
+    from etc_engine.transient.run import Transient
 
 EXIT_RESUMABLE = 75
 
@@ -101,6 +102,7 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
             err=True,
         )
         return EXIT_RESUMABLE
+    _warn_of_digits(study, done)
     series = series_dataset(done, wanted.text)
     _draw(series, wanted)
     with replacing(wanted.output) as file:
@@ -114,6 +116,18 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         err=True,
     )
     return 0
+
+
+def _warn_of_digits(study: NetworkStudy, done: Transient) -> None:
+    """What the reader decided, and contacts that the printed digits of the first or the last frame do not decide."""
+    from etc_engine.cli.particle_options import warn_of_digits
+
+    for note in done.tables[0].notes if done.tables else ():
+        click.echo(f"etc-engine: note: {note}", err=True)
+    values = study.contacts.values()
+    bonded = study.contacts.rule != "overlap"
+    for table in dict.fromkeys((done.tables[0], done.tables[-1]) if done.tables else ()):
+        warn_of_digits(table, values.get("bond_gap", 0.0) if bonded else 0.0, bonded=bonded)
 
 
 def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:

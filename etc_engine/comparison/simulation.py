@@ -91,6 +91,11 @@ def phases(dataset: xarray.Dataset) -> Phases:
         If the dataset is not the result of a sweep, or its particles are of two materials.
     """
     study = current_study(dataset)
+    if "particle_conductivity" not in dataset.coords:
+        raise InputError(
+            "models of two phases need particles of one material, those of this sweep have conductivities of their own "
+            "(by type, or a column of their files)"
+        )
     pores, particles = dataset["pore_conductivity"], dataset["particle_conductivity"]
     if "mixture_conductivity" in dataset.coords:
         other = dataset["mixture_conductivity"]

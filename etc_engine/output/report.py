@@ -89,6 +89,11 @@ def report_page(
     )
 
 
+def _packing(packing: Mapping[str, Any]) -> str:
+    """What made the packings, or the files that hold them."""
+    return f"files {packing['files']}" if "files" in packing else f"{packing['method']}, {packing['radii']}"
+
+
 def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[str, Any]) -> str:
     status = dataset["status"].values
     failed = int(((status > Status.NOT_PERCOLATING) & (status < Status.NOT_RUN)).sum())
@@ -96,7 +101,7 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     bound = "broken" if comparison.attrs["bound_broken"] else "kept"
     box = " x ".join(f"{length:g}" for length in study["packing"]["box"])
     facts = {
-        "packing": f"{study['packing']['method']}, {study['packing']['radii']}",
+        "packing": _packing(study["packing"]),
         "box [m]": f"{box}, {study['packing']['periodic'] or 'not'} periodic",
         "contacts": study["contacts"].get("rule", "none: the whole cell is solved"),
         "engine and method": f"{study['conduction']['engine']}, {_words(study['conduction']['method'])}",

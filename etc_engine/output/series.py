@@ -81,6 +81,7 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
         coords={
             "time": ("time", np.array([s.time for s in states]), {"units": "s", "long_name": "time", "axis": "T"}),
             "wall": ("wall", list(WALLS[: rates.shape[1] - 1]), {"long_name": "wall of the box"}),
+            **_ids(transient),
         },
         attrs=_attributes(transient, text),
     )
@@ -122,6 +123,14 @@ def _rates_and_means(transient: Transient) -> tuple[NDArray[np.float64], NDArray
             rates.append(system.heat.rates(state.time, state.temperatures))
             means.append(system.particle_temperatures(state.temperatures))
     return np.array(rates), np.array(means)
+
+
+def _ids(transient: Transient) -> dict[str, Any]:
+    """The ids of the particles as a coordinate, where their file has them."""
+    ids = transient.tables[0].ids if transient.tables else None
+    if ids is None or np.unique(ids).size != ids.size:
+        return {}
+    return {"particle": ("particle", ids, {"long_name": "id of the particle in its file"})}
 
 
 def _places(transient: Transient) -> tuple[Any, NDArray[np.float64], NDArray[np.float64]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from etc_engine.medium.conduction import Conduction
 from etc_engine.packing import PackingSpec
+from etc_engine.particle_files.collection import PackingSource
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,8 @@ class RealizationSpec:
 
     Parameters
     ----------
-    packing : PackingSpec
+    packing : PackingSpec or PackingSource
+        What makes the packing, or the file that holds it.
     rule : str
         Contact rule, a word of `etc_engine.medium.rules.RULES`.
     conduction : tuple of Conduction
@@ -29,15 +31,18 @@ class RealizationSpec:
         Solid of the particles by name: its conductivity at ``temperature`` takes the place of a number.
     gas : str or mapping, optional
         What fills the pores, by name or mole fractions, see `etc_engine.materials.gas_state`.
+    types : mapping of str to float or str, optional
+        Of packings in files: conductivity [W/(m K)] or material by type of particle.
     """
 
-    packing: PackingSpec
+    packing: PackingSpec | PackingSource
     rule: str = "overlap"
     conduction: tuple[Conduction, ...] = (Conduction(),)
     values: Mapping[str, float] = field(default_factory=dict)
     axes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     material: str | None = None
     gas: str | Mapping[str, float] | None = None
+    types: Mapping[str, float | str] | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -113,23 +113,39 @@ class Source(StudyTable):
     particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
         default=None, description="a list of whole numbers from 0, the rows of particles; all by default"
     )
+    ids: Annotated[list[Annotated[int, Field(strict=True)]], SOME] | None = Field(
+        default=None, description="a list of whole numbers, the ids of particles in their file"
+    )
+    types: Annotated[list[int | Word], SOME] | None = Field(
+        default=None, description="a list of types of particles, as their file names them"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Source:
+        given = [key for key in ("particles", "ids", "types") if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise ValueError(f"{given[0]} and {given[1]} both choose particles, take one of them out")
+        return self
 
 
 class ParticlesTable(StudyTable):
     """``[particles]``: what they are made of, and how warm they are at first; a number, or one for each particle."""
 
     conductivity: Positive = Field(default=1.0, description=f"{POSITIVE} [W/(m K)]")
+    types: dict[str, Positive] | None = Field(
+        default=None, description="a table such as { 1 = 2.4, 2 = 1.1 }: conductivity by type of the file [W/(m K)]"
+    )
     heat_capacity: Annotated[
         Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], SOME, Tag(AS_LIST)], WRITTEN
     ] = Field(description=f"{POSITIVE}, or a list of such, one for each particle: rho c [J/(m3 K)]")
     initial: Annotated[
-        Annotated[Number, Tag(AS_NUMBER)]
+        Annotated[Number | Literal["file"], Tag(AS_NUMBER)]
         | Annotated[list[Number], SOME, Tag(AS_LIST)]
         | Annotated[Gradient, Tag(AS_TABLE)],
         WRITTEN,
     ] = Field(
-        description=f"{NUMBER} [K], a list of such, one for each particle, or a table such as "
-        "{ value = 0.0, gradient = [1.0, 0.0] }"
+        description=f"{NUMBER} [K], a list of such, one for each particle, a table such as "
+        "{ value = 0.0, gradient = [1.0, 0.0] }, or 'file': the temperatures of the particle file"
     )
 
 

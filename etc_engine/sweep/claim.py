@@ -113,6 +113,10 @@ def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str 
     """
     for key in sorted({*found, *wanted}, key=lambda key: (key != "schema", key)):
         there, here = found.get(key), wanted.get(key)
+        if (
+            there is not None and here is not None and _alike(there, here)
+        ):  # lists of tables, such as the files of a study
+            there, here = ({f"{k}": item for k, item in enumerate(items)} for items in (there, here))
         if isinstance(there, Mapping) and isinstance(here, Mapping):
             inner = difference(there, here, f"{prefix}{key}.")
             if inner:
@@ -120,6 +124,12 @@ def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str 
         elif there != here:
             return f"{prefix}{key} is {there!r} there and {here!r} here"
     return ""
+
+
+def _alike(there: Any, here: Any) -> bool:
+    """Whether both are lists of tables of one length."""
+    lists = isinstance(there, (list, tuple)) and isinstance(here, (list, tuple)) and len(there) == len(here)
+    return lists and all(isinstance(item, Mapping) for item in (*there, *here))
 
 
 def _make_folder(output: Path) -> Path:
@@ -180,6 +190,8 @@ def refuse_other_study(study: Identified, digest: str, identity: Mapping[str, An
         return
     wanted = study.identity()
     found = {key: value for key, value in identity.items() if key in wanted}
+    if isinstance(found.get("packing"), Mapping):  # where files are is no part of what they hold
+        found["packing"] = {key: value for key, value in found["packing"].items() if key != "folder"}
     raise StudyError(
         f"{place} belongs to another study ({difference(found, wanted)}): "
         "resume with that study, or start anew with --overwrite"

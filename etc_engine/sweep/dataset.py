@@ -98,6 +98,9 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
         "direction_i": ("direction_i", axes, {"long_name": "direction of the flux"}),
         "direction_j": ("direction_j", axes, {"long_name": "direction of the gradient"}),
     }
+    for name, (held, meaning) in study.realization_coordinates().items():
+        kind = object if isinstance(held[0], str) else np.int64
+        found[name] = ("realization", np.array(held, dtype=kind), {"long_name": meaning})
     for name, values in study.quantities.items():
         several = name in study.axes
         attributes = QUANTITIES[name].attributes(study.box.dimension)

@@ -47,6 +47,7 @@ class Forecast:
     shard_bytes: int
     dataset_bytes: int
     remarks: tuple[str, ...]
+    packings: tuple[str, ...] = ()
 
     def seconds(self, units: int) -> float:
         """Time for so many units on all ranks: an even mixture of the costliest and the cheapest."""
@@ -86,7 +87,16 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
         shard_bytes=len(encode(record)) * len(units),
         dataset_bytes=assemble(study, tabulate(study, []), {}).nbytes,
         remarks=tuple(messages),
+        packings=_packings(study),
     )
+
+
+def _packings(study: Study) -> tuple[str, ...]:
+    """The packings of a study over files, a line for each."""
+    columns = study.realization_coordinates()
+    if not columns:
+        return ()
+    return tuple(f"{file}, frame {frame}" for file, frame in zip(columns["file"][0], columns["frame"][0], strict=True))
 
 
 def what_is_there(study: Study, output: Path) -> tuple[str, set[tuple[int, int]]]:

@@ -237,7 +237,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     """
     started = time.time()
     try:
-        result = realize(spec, unit_rng(study.seed, unit))
+        result = realize(study.for_realization(spec, unit.realization), unit_rng(study.seed, unit))
     except (MemoryError, OSError) as error:
         place = "the packer's own density" if unit.density is None else f"density {unit.density:g}"
         raise OutputError(
