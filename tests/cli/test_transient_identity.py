@@ -94,7 +94,7 @@ def test_names_that_are_not_there_are_refused(run, words, said):
 
 
 def test_a_part_of_the_file(run, tmp_path):
-    done, out = run("ids = [10]")
+    _, out = run("ids = [10]")
     text = (tmp_path / "t.toml").read_text()
     (tmp_path / "t.toml").write_text(text.replace('"p.dump"', '"p.dump", crop = ["0.9:2.6", ""]'))
     from etc_engine.cli import run as command
