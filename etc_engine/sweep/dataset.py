@@ -80,7 +80,7 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
-    if "exact" in study.methods:
+    if "exact" in study.methods or study.conduction.bounds:
         meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
         dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
