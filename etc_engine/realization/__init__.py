@@ -1,7 +1,8 @@
 """One realization: pack, find contacts, conduct; and the table of engines."""
 
 from etc_engine.medium.conduction import Conduction
-from etc_engine.realization.engines import ENGINES, Engine, Method, effective_conductivity, field_along, find_engine
+from etc_engine.realization.engine import Engine, Method
+from etc_engine.realization.engines import ENGINES, effective_conductivity, field_along, find_engine
 from etc_engine.realization.outcome import Outcome, Realization, Status
 from etc_engine.realization.realize import realize
 from etc_engine.realization.specification import RealizationSpec

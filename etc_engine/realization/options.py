@@ -82,6 +82,11 @@ MATERIAL_CURVE = Option(
 DIPOLES = Option("dipole states in a transient, for earlier times", False, _truth)
 BOUNDARY = Option("periodic or walls; as the box by default", None, word_of("periodic", "walls"))
 GREEN = Option("Green operator", "rotated", word_of("rotated", "continuous"))
-DEGREE = Option("polynomial degree of the temperature on the edges of cells", 3, whole_number(1, 5))
-ERROR_ESTIMATE = Option("whether the discretization error is estimated, by two finer computations", False, _truth)
+FRAME = Option(
+    "degrees of the temperature on edges and facets of the cells of spheres; 1/1 by default, 3/3 in a better conductor",
+    None,
+    word_of("1/1", "2/1", "3/1", "3/2", "3/3"),
+)
+DEGREE = Option("polynomial degree of the temperature on the edges of the cells of disks", 3, whole_number(1, 5))
+ERROR_ESTIMATE = Option("whether the discretization error is estimated, by finer computations", False, _truth)
 BOUNDS = Option("whether rigorous bounds are computed, by a conforming mesh of few disks", False, _truth)

@@ -12,7 +12,8 @@ from etc_engine.errors import InputError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.transient import ParticleSystem, Source
 from etc_engine.medium.walls import WallCondition
-from etc_engine.realization.engines import ENGINES, Engine, find_engine
+from etc_engine.realization.engine import Engine
+from etc_engine.realization.engines import ENGINES, find_engine
 
 
 def transient_system(

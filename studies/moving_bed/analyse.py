@@ -15,14 +15,14 @@ from matplotlib.figure import Figure
 
 from etc_engine import effective_conductivity
 from etc_engine.engines.pipe.steady import pipe_conductivity
-from etc_engine.engines.pipe.transient import PipeTransient
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import overlap_contacts
+from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
-from etc_engine.transient.moving import MovingState, march_trajectory
+from etc_engine.transient.moving import MovingState, Stepping, march_trajectory
 
 WALLS = {"bottom": FixedTemperature(1.0), "top": FixedTemperature(0.0)}
 PECLET = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
@@ -31,12 +31,8 @@ SETTLED = 8.0
 SHOWN = (0.0, 4.0, 24.0)
 
 
-def pipes(network: ContactNetwork, capacities: np.ndarray) -> PipeTransient:
-    return transient_system(
-        medium_of(network, heat_capacity=capacities / network.cut_measures(prescribed=True)),
-        WALLS,
-        engine="pipe",
-    )
+def pipes(network: ContactNetwork, capacities: np.ndarray) -> ParticleSystem:
+    return transient_system(medium_of(network), WALLS, engine="pipe", capacities=capacities)
 
 
 def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:
@@ -48,7 +44,7 @@ def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:
     rest = pipe_conductivity(medium_of(network), axes=(1,)).solutions[0].temperatures[:, 0]
     start = np.where(np.isnan(rest), 1.0 - bed.packings[0].centers[:, 1] / height, rest)
     timed = Trajectory(bed.times / rate, bed.packings, bed.ids)
-    return list(march_trajectory(timed, overlap_contacts, pipes, start, steps=2))
+    return list(march_trajectory(timed, overlap_contacts, pipes, start, stepping=Stepping(steps=2)))
 
 
 def flux(bed: Trajectory, states: list[MovingState]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from etc_engine.sweep.dataset import write_dataset
+from etc_engine.sweep.result_file import write_dataset
 
 STUDIES = Path(__file__).parents[2] / "studies"
 # for each study: the text that makes it small, and words that its analysis prints
@@ -88,7 +88,7 @@ def test_analyses_import_nothing_of_the_engine():
 
 def test_the_tutorial_draws_a_figure(made_sweep, tmp_path):
     text = re.sub(r"density = \[.*?\]", "density = [0.6, 0.7]", (STUDIES / "density_angle" / "study.toml").read_text())
-    write_dataset(made_sweep(text, lambda f, a, _, r: (f - 0.5) * (a + r)), tmp_path / "out.nc")
+    write_dataset(made_sweep(text, lambda f, a, _, r: (f - 0.5) * (a["contact_angle"] + r)), tmp_path / "out.nc")
     block = re.search(r"<!-- own figure -->\n```python\n(.*?)```", (STUDIES / "README.md").read_text(), re.S)
     line = [sys.executable, "-W", "error", "-c", block[1]]
     environment = {**os.environ, "MPLBACKEND": "Agg"}

@@ -10,14 +10,14 @@ import xarray
 TABLE_2 = Path(__file__).parents[1] / "published" / "data" / "feng2008_table2_particles.csv"
 
 
-@pytest.mark.parametrize(("words", "expected"), [([], 0.27433), (["--pipe-resistance", "uniform"], 0.26378)])
+@pytest.mark.parametrize(("words", "expected"), [([], 0.27433), (["--method", "uniform"], 0.26378)])
 def test_conductivity_of_the_twelve_particles(etc_engine, words, expected):
-    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--method", "pipe", *words, "--json")
+    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--engine", "pipe", *words, "--json")
     assert done.returncode == 0, done.stderr
     record = json.loads(done.stdout)
     assert record["conductivity"] == pytest.approx(expected, abs=5e-6)
-    assert (record["method"], record["unknowns"], len(record["contact_temperatures"])) == ("pipe", 12, 17)
-    assert record["pipe_resistance"] == (words[1] if words else "chord")
+    assert (record["engine"], record["method"]) == ("pipe", words[1] if words else "chord")
+    assert (record["unknowns"], record["contacts"]) == (12, 17)
     assert "model_error_estimate" not in record
 
 
@@ -25,15 +25,15 @@ def test_outputs(etc_engine, tmp_path):
     places = {"-o": tmp_path / "a.nc", "--vtk": tmp_path / "a.vtp", "--plot": tmp_path / "a.png"}
     pytest.importorskip("vtkmodules.vtkIOXML", reason="the extra vtk is not installed")
     outputs = [word for pair in places.items() for word in pair]
-    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--method", "pipe", *outputs)
+    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--engine", "pipe", *outputs)
     assert done.returncode == 0, done.stderr
     assert all(path.stat().st_size > 1000 for path in places.values())
 
 
 def test_netcdf_holds_the_flows_of_the_pipes(etc_engine, tmp_path):
-    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--method", "pipe", "-o", tmp_path / "a.nc", "--json")
+    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--engine", "pipe", "-o", tmp_path / "a.nc", "--json")
     with xarray.open_dataset(tmp_path / "a.nc") as data:
-        assert (data.attrs["method"], data.attrs["pipe_resistance"]) == ("pipe", "chord")
+        assert (data.attrs["engine"], data.attrs["method"]) == ("pipe", "chord")
         net = np.zeros(12)
         flow, pairs = data.heat_flow.values, data.contact_particle.values
         np.add.at(net, pairs[:, 0], flow)
@@ -45,7 +45,7 @@ def test_netcdf_holds_the_flows_of_the_pipes(etc_engine, tmp_path):
 
 
 def test_picture_alone(etc_engine, tmp_path):
-    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--method", "pipe", "--plot", tmp_path / "a.png")
+    done = etc_engine("solve", TABLE_2, "--box", "1,1", "--engine", "pipe", "--plot", tmp_path / "a.png")
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
@@ -53,9 +53,12 @@ def test_picture_alone(etc_engine, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--method", "pipe", "--pipe-resistance", "round"], "unknown pipe resistance 'round'"),
-        (["--method", "chord", "--pipe-resistance", "chord"], "--pipe-resistance goes with --method pipe"),
-        (["--method", "pipe", "--modes", "3"], "--modes goes with --method exact or arc"),
+        (["--engine", "pipe", "--method", "round"], "engine pipe has no method 'round': expected one of"),
+        (["--method", "pipe"], "--method pipe is now --engine pipe --method chord"),
+        (["--method", "pipe", "--pipe-resistance", "uniform"], "is now --engine pipe --method uniform"),
+        (["--pipe-resistance", "uniform"], "--pipe-resistance uniform is now --engine pipe --method uniform"),
+        (["--engine", "pipe", "--modes", "3"], "modes means nothing to method chord of engine pipe"),
+        (["--engine", "voxel"], "engine voxel resolves the pores: use etc-engine homogenize"),
     ],
 )
 def test_words_that_are_refused(etc_engine, words, message):

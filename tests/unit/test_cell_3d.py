@@ -22,7 +22,7 @@ from etc_engine.engines.dtem.cell_3d.shell import radial_moments, shell_matrices
 from etc_engine.engines.dtem.cell_3d.sphere_energy import green_function, green_matrix, green_table, sandwich
 from etc_engine.engines.dtem.cell_3d.steady import solve_sphere_cells, sphere_cell_conductivity, sphere_cells
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.laws.sphere import resistance_matrices
+from etc_engine.laws.sphere_dents import resistance_matrices
 from etc_engine.medium.facets import facet_links
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.packing.particles import ParticlePacking

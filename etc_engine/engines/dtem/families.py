@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from etc_engine.engines.dtem import conductivity as elements
 from etc_engine.engines.dtem import facet_medium as sphere_facets
 from etc_engine.engines.dtem.cell import medium as disk_cells
 from etc_engine.engines.dtem.cell.transient import cell_system
+from etc_engine.engines.dtem.cell_3d import medium as sphere_cells
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.transient import element_system
+from etc_engine.errors import InputError
 from etc_engine.medium.conduction import Conduction, Result
 from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.field import ParticleField
@@ -33,12 +35,18 @@ class Family:
         (method, result) -> what a user should know about the accuracy of a result.
     system : callable, optional
         (medium, walls, method=, source=, capacities=, options) -> ParticleSystem.
+    limit : str, optional
+        Method of `CONTACTS` that takes over where the pores insulate.
+    foreign : mapping
+        Options of the method that belong to the other dimension, with the values that say nothing.
     """
 
     solve: Callable[[Sequence[Medium], Conduction], list[Result]]
     recover: Callable[[Medium, Any, int], ParticleField]
     remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
     system: Callable[..., ParticleSystem] | None = None
+    foreign: Mapping[str, Any] = field(default_factory=dict)
+    limit: str | None = None
 
 
 CONTACTS = Family(
@@ -50,7 +58,21 @@ CONTACTS = Family(
 """Elements whose nodes are the contacts; heat takes no other way."""
 
 FAMILIES: Mapping[tuple[str, int], Family] = {
-    ("cell", 2): Family(disk_cells.solve_series, disk_cells.disk_field, disk_cells.accuracy_remarks, cell_system),
+    ("cell", 2): Family(
+        disk_cells.solve_series,
+        disk_cells.disk_field,
+        disk_cells.accuracy_remarks,
+        cell_system,
+        {"frame": None},
+        "chord",
+    ),
+    ("cell", 3): Family(
+        sphere_cells.solve_series,
+        sphere_cells.sphere_field,
+        sphere_cells.accuracy_remarks,
+        sphere_cells.sphere_system,
+        {"degree": 3, "bounds": False},
+    ),
     ("facets", 3): Family(
         sphere_facets.solve_series,
         sphere_facets.sphere_field,
@@ -61,29 +83,49 @@ FAMILIES: Mapping[tuple[str, int], Family] = {
 """Families by method and dimension; every other method is one of `CONTACTS`."""
 
 
-LIMIT = "chord"
-"""Where the pores insulate, a family that needs them leaves its media to `CONTACTS` by this method."""
-
-
 def family_of(method: str, medium: Medium) -> tuple[Family, str]:
-    """The family that solves a medium by a method, and the method it uses."""
+    """The family that solves a medium by a method, and the method it uses.
+
+    Raises
+    ------
+    InputError
+        If the pores insulate, and the method has no limit of its own for that.
+    """
     family = FAMILIES.get((method, medium.dimension), CONTACTS)
-    if family is not CONTACTS and not medium.pores.conduct:
-        return CONTACTS, LIMIT
-    return family, method
+    if family is CONTACTS or medium.pores.conduct:
+        return family, method
+    if family.limit is None:
+        raise InputError(f"method {method} is only valid with pores that conduct in {medium.dimension}D")
+    return CONTACTS, family.limit
 
 
 def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
-    """Effective conductivity of media on one packing, one result per medium."""
+    """Effective conductivity of media on one packing, one result per medium.
+
+    Raises
+    ------
+    InputError
+        If an option belongs to the other dimension, or the pores must conduct and do not.
+    """
     found: dict[int, Result] = {}
     for conduct in (True, False):
         rows = [row for row, medium in enumerate(media) if medium.pores.conduct == conduct]
         if rows:
-            family, method = family_of(conduction.method, media[rows[0]])
-            options = conduction.options if method == conduction.method else {}
-            task = replace(conduction, method=method, options=options)
-            found |= dict(zip(rows, family.solve([media[row] for row in rows], task), strict=True))
+            some = [media[row] for row in rows]
+            found |= dict(zip(rows, _solve_alike(some, conduction), strict=True))
     return [found[row] for row in range(len(media))]
+
+
+def _solve_alike(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
+    """Results of media whose pores all conduct, or all insulate."""
+    family, method = family_of(conduction.method, media[0])
+    if method != conduction.method:
+        return family.solve(media, replace(conduction, method=method, options={}))
+    for name, neutral in family.foreign.items():
+        if conduction.options.get(name, neutral) != neutral:
+            raise InputError(f"option {name} means nothing to method {method} in {media[0].dimension}D: leave it out")
+    own = {name: value for name, value in conduction.options.items() if name not in family.foreign}
+    return family.solve(media, replace(conduction, options=own))
 
 
 def field_of(medium: Medium, method: str, solution: Any, load: int) -> ParticleField:

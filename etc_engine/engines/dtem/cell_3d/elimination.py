@@ -82,7 +82,10 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
     matrix = np.zeros((first + columns, first + columns))
     directions, angles = np.zeros((nodes, 3)), np.zeros(nodes)
     normals, sines = np.zeros((flows, 3)), np.zeros(flows)
-    room = 16 * nodes + 4096
+    room = 0
+    for s in range(len(side_places)):
+        after = side_places[s + 1] if s + 1 < len(side_places) else nodes
+        room += (3 * (after - side_places[s])) ** 2  # a side has at most three nodes per inner node
     rows, cols, values = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64), np.empty(room)
     entries, flow = 0, 0
     for s in range(len(side_places)):
@@ -136,11 +139,6 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
                     + points[a, 1] * axes[face, 1, axis]
                     + points[a, 2] * axes[face, 2, axis]
                 )
-        if entries + n * n > len(rows):
-            more = len(rows) + n * n
-            rows = np.concatenate((rows, np.empty(more, dtype=np.int64)))
-            cols = np.concatenate((cols, np.empty(more, dtype=np.int64)))
-            values = np.concatenate((values, np.empty(more)))
         for a in range(n):
             for b in range(n):
                 if rim[a, b] != 0.0:

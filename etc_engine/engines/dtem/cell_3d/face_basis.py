@@ -76,13 +76,20 @@ def face_basis(nodes, triangles, inner, edges, bubbles, rule):  # type: ignore[n
         column += on_edge[k]
     stiffness, mass = planar_matrices(nodes, triangles, shapes, weights)
     right = np.zeros((inner, size))
-    right[:, :column] = -np.dot(stiffness[:inner, inner:], np.ascontiguousarray(values[inner:, :column]))
-    area, cu, cv = mass.sum(), (mass * nodes[:, 0]).sum(), (mass * nodes[:, 1]).sum()
+    outer = np.ascontiguousarray(values[inner:, :column])
+    right[:, :column] = -np.dot(np.ascontiguousarray(stiffness[:inner, inner:]), outer)
+    area = cu = cv = 0.0
+    for a in range(n):
+        area, cu, cv = area + mass[a], cu + mass[a] * nodes[a, 0], cv + mass[a] * nodes[a, 1]
     for b in range(len(bubbles)):
         for a in range(inner):
             u, v = (nodes[a, 0] - cu / area) / np.sqrt(area), (nodes[a, 1] - cv / area) / np.sqrt(area)
             right[a, column + b] = mass[a] * u ** bubbles[b, 0] * v ** bubbles[b, 1]
     values[:inner] = np.linalg.solve(np.ascontiguousarray(stiffness[:inner, :inner]), right)
     for b in range(len(bubbles)):
-        values[:, column + b] /= np.abs(values[:, column + b]).max()
+        largest = 0.0
+        for a in range(inner):
+            largest = max(largest, abs(values[a, column + b]))
+        for a in range(inner):
+            values[a, column + b] /= largest
     return values

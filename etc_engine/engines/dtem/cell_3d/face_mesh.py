@@ -105,8 +105,10 @@ def node_positions(boundary, center, levels, circle, level, ray):  # type: ignor
     rings, pieces = len(levels), len(boundary) // 2
     diagonals = 1 + 2 * pieces * (rings - 1) + pieces * rings
     inner = len(level) - 2 * pieces
-    arms = boundary - center
-    far = np.sqrt((arms**2).sum(axis=1))
+    arms, far = np.empty_like(boundary), np.empty(2 * pieces)
+    for q in range(2 * pieces):
+        arms[q, 0], arms[q, 1] = boundary[q, 0] - center[0], boundary[q, 1] - center[1]
+        far[q] = np.sqrt(arms[q, 0] ** 2 + arms[q, 1] ** 2)
     for a in range(len(level)):
         q, radius = ray[a], _radius(level[a], far[ray[a]], circle)
         du, dv = arms[q, 0] / far[q], arms[q, 1] / far[q]
@@ -122,8 +124,11 @@ def node_positions(boundary, center, levels, circle, level, ray):  # type: ignor
         for r in range(1, rings):
             for k in range(pieces):
                 a, m = diagonals + (r - 1) * pieces + k, 2 * ((k + 1) % pieces)
-                nodes[a] = center + 0.5 * (levels[r - 1] * arms[2 * k] + levels[r] * arms[m])
-    nodes[inner:] = boundary
+                for axis in range(2):
+                    middle = 0.5 * (levels[r - 1] * arms[2 * k, axis] + levels[r] * arms[m, axis])
+                    nodes[a, axis] = center[axis] + middle
+    for q in range(2 * pieces):
+        nodes[inner + q, 0], nodes[inner + q, 1] = boundary[q, 0], boundary[q, 1]
     return nodes
 
 

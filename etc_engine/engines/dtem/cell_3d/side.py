@@ -16,7 +16,10 @@ def disk_mean(nodes, basis, level, rings_inside, pieces):  # type: ignore[no-unt
 
     A third of the centre and two thirds of the edge: exact up to the second degree. The edge by Simpson's rule.
     """
-    mean = basis[0] / 3.0
+    columns = basis.shape[1]
+    mean = np.empty(columns)
+    for i in range(columns):
+        mean[i] = basis[0, i] / 3.0
     first = 1 + (rings_inside - 1) * 2 * pieces
     if level[first] != 1.0:
         first = len(level) - 2 * pieces
@@ -24,7 +27,9 @@ def disk_mean(nodes, basis, level, rings_inside, pieces):  # type: ignore[no-unt
         a, b, c = first + 2 * k, first + 2 * k + 1, first + (2 * k + 2) % (2 * pieces)
         turn = nodes[a, 0] * nodes[c, 1] - nodes[a, 1] * nodes[c, 0]
         along = nodes[a, 0] * nodes[c, 0] + nodes[a, 1] * nodes[c, 1]
-        mean += np.arctan2(turn, along) / (3.0 * np.pi) * (basis[a] + 4.0 * basis[b] + basis[c]) / 6.0
+        part = np.arctan2(turn, along) / (18.0 * np.pi)
+        for i in range(columns):
+            mean[i] += part * (basis[a, i] + 4.0 * basis[b, i] + basis[c, i])
     return mean
 
 
@@ -61,14 +66,17 @@ def condense(energy, basis, level, inner, contact):  # type: ignore[no-untyped-d
     if contact:
         for a in range(inner):
             if level[a] == 1.0:
-                energy[a] += energy[n + a]
-                energy[:, a] += energy[:, n + a]
-                energy[n + a] = 0.0
-                energy[:, n + a] = 0.0
+                for b in range(functions * n):
+                    energy[a, b] += energy[n + a, b]
+                    energy[n + a, b] = 0.0
+                for b in range(functions * n):
+                    energy[b, a] += energy[b, n + a]
+                    energy[b, n + a] = 0.0
             if level[a] <= 1.0:
                 for p in range(2, functions):
-                    energy[p * n + a] = 0.0
-                    energy[:, p * n + a] = 0.0
+                    for b in range(functions * n):
+                        energy[p * n + a, b] = 0.0
+                        energy[b, p * n + a] = 0.0
                     energy[p * n + a, p * n + a] = 1.0
     outer = n - inner
     # the order of the rows kept: bubbles of boundary nodes, rim, frame; then the inner bubbles
