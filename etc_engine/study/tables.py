@@ -57,7 +57,7 @@ def _field_of(option: Option) -> tuple[Any, Any]:
             raise ValueError(f"found {value!r}, allowed: {allowed}")
         return value
 
-    kind = {int: "integer", str: "string"}.get(type(option.default))
+    kind = {bool: "boolean", int: "integer", str: "string"}.get(type(option.default))
     schema = WithJsonSchema({"type": kind} if kind else {})
     return Annotated[Any, AfterValidator(checked), schema], Field(
         default=option.default, description=option.description

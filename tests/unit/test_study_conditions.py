@@ -7,6 +7,8 @@ import pytest
 
 from etc_engine import Medium, effective_conductivity
 from etc_engine.comparison import evaluate_models, model_lines
+from etc_engine.comparison.sensitivity import sensitivities
+from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import StudyError
 from etc_engine.materials import find_solid, gas_state, jump_length
 from etc_engine.medium.conditions import Conditions, pores_at
@@ -195,3 +197,13 @@ def test_bed_models_take_their_inputs_from_the_result(made_sweep):
     lines = model_lines(comparison)["model_conductivity"]
     at = lines.sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
     assert at.values.ravel()[0] == pytest.approx(float(expected), rel=1e-12)
+
+
+def test_the_slope_of_a_power_law_is_its_exponent(made_sweep):
+    pytest.importorskip("CoolProp")
+    data = made_sweep(BED, lambda _, values, *__: 1e-3 * values["pressure"] ** 0.25 * values["temperature"] ** 1.5)
+    found = sensitivities(simulated(data))
+    np.testing.assert_allclose(found["pressure"], 0.25, rtol=1e-9)
+    np.testing.assert_allclose(found["temperature"], 1.5, rtol=1e-9)
+    assert list(found) == ["pressure", "temperature"]
+    np.testing.assert_allclose(found["temperature"]["temperature"], [np.sqrt(400.0 * 800.0)])

@@ -10,12 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.facet_elements import FacetMaterial, FacetSides, facet_resistances, facet_sides
+from etc_engine.engines.dtem.facet_elements import (
+    FacetMaterial,
+    FacetSides,
+    facet_elements,
+    facet_resistances,
+    facet_sides,
+)
 from etc_engine.engines.dtem.facet_family import FEW_MATERIALS, FamilyMember, solve_family
 from etc_engine.engines.dtem.facet_steady import (
     FacetSolution,
+    accuracy_warnings,
     facet_conductivity,
-    low_coordination_warning,
     uniform_material,
 )
 from etc_engine.engines.dtem.storage import with_states
@@ -177,11 +183,8 @@ def _joined(links: FacetLinks, members: Mapping[tuple[int, ...], FamilyMember]) 
 
 
 def accuracy_remarks(_: str, result: EffectiveConductivity[FacetSolution]) -> tuple[str, ...]:
-    """A warning where spheres with few facets conduct much better than the pores."""
-    if not result.solutions:
-        return ()
-    text = low_coordination_warning(result.solutions[0].links, result.solutions[0].material)
-    return (text,) if text else ()
+    """Warnings where facet links are known to be inaccurate."""
+    return accuracy_warnings(result.solutions[0]) if result.solutions else ()
 
 
 def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> ParticleField:
@@ -289,6 +292,7 @@ def sphere_system(
     sides = facet_sides(links, kept, bool((material.open_fluid > 0.0).all()))
     scales = material.conductivity * links.packing.radii
     h = facet_resistances(links, material, sides)
+    facet_elements(sides, h)  # mends what is not positive definite
     elements, bad = with_states(h, sides.offsets, sides.nodes, scales, 3, dipoles=dipoles)
     if bad >= 0:
         cure = "leave the dipoles out or use smaller contacts" if dipoles else "use smaller contacts"
