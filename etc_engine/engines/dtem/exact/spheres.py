@@ -7,6 +7,8 @@ the resistances between all modes of a sphere: V of the full ball, L what the ca
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -31,6 +33,30 @@ from etc_engine.laws.sphere_modes import (
     pair_means,
 )
 from etc_engine.medium.sides import ContactSides, refuse_overlap
+
+
+class ContactDisks(NamedTuple):
+    """Contact disks and cuts of spheres as compiled code takes them, sorted by sphere.
+
+    Parameters
+    ----------
+    offsets : ndarray of int, shape (n + 1,)
+        Disks of sphere p: ``offsets[p]`` to ``offsets[p + 1]``.
+    normals : ndarray, shape (c, 3)
+        Unit directions.
+    axes : ndarray of complex, shape (c, 3)
+        E = e_1 + i e_2 across each.
+    alpha : ndarray, shape (c,) [rad]
+    cutting : ndarray of bool, shape (c,)
+        Whether the sphere ends at the disk.
+    """
+
+    offsets: NDArray[np.int64]
+    normals: NDArray[np.float64]
+    axes: NDArray[np.complex128]
+    alpha: NDArray[np.float64]
+    cutting: NDArray[np.bool_]
+
 
 DEGREE = 2
 """Of the flux modes, unless another one is asked for."""
@@ -78,11 +104,7 @@ def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64]
     values = np.zeros(int(starts[-1]))
     bad = _fill(
         sides.offsets,
-        offsets,
-        normals,
-        axes,
-        alpha,
-        np.ones(alpha.size, dtype=np.bool_),
+        ContactDisks(offsets, normals, axes, alpha, np.ones(alpha.size, dtype=np.bool_)),
         tables,
         own_blocks(tables, alpha),
         np.ascontiguousarray(conductivity * sides.radii),
@@ -115,11 +137,7 @@ def exact_sphere_potentials(
     _refuse_wide(sides.offsets, normals, sides.alpha)
     potentials = np.zeros(sides.nodes.size)
     _potentials(
-        sides.offsets,
-        normals,
-        axes,
-        sides.alpha,
-        cutting,
+        ContactDisks(sides.offsets, normals, axes, sides.alpha, cutting),
         tables,
         own_blocks(tables, sides.alpha),
         np.ascontiguousarray(conductivity * sides.radii),
@@ -166,17 +184,14 @@ def _across(normals: NDArray[np.float64]) -> NDArray[np.complex128]:
 
 @njit(cache=True)
 def _resistances(
-    first: int,
-    last: int,
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
-    cutting: NDArray[np.bool_],
+    p: int,
+    disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
     h: NDArray[np.float64],
 ) -> bool:
-    """H = (V^-1 - L)^-1 of the disks ``first`` to ``last``, times kappa R; False if it is not positive definite."""
+    """H = (V^-1 - L)^-1 of the disks of sphere p, times kappa R; False if it is not positive definite."""
+    first, last = disks.offsets[p], disks.offsets[p + 1]
     families = tables.orders.size
     base = np.zeros(families + 1, dtype=np.int64)
     for f in range(families):
@@ -187,7 +202,7 @@ def _resistances(
     for i in range(n):
         _own_block(own.selves[first + i], tables, base, i * modes, 1.0, h)
         for j in range(i):
-            _pair_block(first + i, first + j, normals, axes, alpha, tables, base, means, i * modes, j * modes, h)
+            _pair_block((first + i, first + j), disks, tables, base, means, (i * modes, j * modes), h)
             for f in range(families):
                 h[i * modes + base[f], j * modes] -= own.gauges[first + i, f]
                 h[i * modes, j * modes + base[f]] -= own.gauges[first + j, f]
@@ -197,7 +212,7 @@ def _resistances(
     if not cholesky_inverse(h, n * modes):
         return False
     for i in range(n):
-        if cutting[first + i]:
+        if disks.cutting[first + i]:
             _own_block(own.caps[first + i], tables, base, i * modes, -1.0, h)
     if not cholesky_inverse(h, n * modes):
         return False
@@ -226,19 +241,17 @@ def _own_block(
 
 @njit(cache=True)
 def _pair_block(
-    a: int,
-    b: int,
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
+    pair: tuple[int, int],
+    disks: ContactDisks,
     tables: ModeTables,
     base: NDArray[np.int64],
     means: NDArray[np.float64],
-    row: int,
-    column: int,
+    at: tuple[int, int],
     h: NDArray[np.float64],
 ) -> None:
     """<s_a, V s_b> of all modes of two disks; cos and sin are (E + E*)/2 and (E - E*)/(2i)."""
+    (a, b), (row, column) = pair, at
+    normals, axes, alpha = disks.normals, disks.axes, disks.alpha
     cosine = 0.0
     along, back, straight, crossed = 0j, 0j, 0j, 0j
     for axis in range(3):
@@ -266,11 +279,7 @@ def _pair_block(
 @njit(cache=True)
 def _fill(
     side_offsets: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
-    cutting: NDArray[np.bool_],
+    disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
     scales: NDArray[np.float64],
@@ -284,11 +293,11 @@ def _fill(
         modes += 1 if m == 0 else 2
     for p in range(side_offsets.size - 1):
         first, contacts = side_offsets[p], side_offsets[p + 1] - side_offsets[p]
-        size, every = contacts * modes, (offsets[p + 1] - offsets[p]) * modes
+        size, every = contacts * modes, (disks.offsets[p + 1] - disks.offsets[p]) * modes
         if contacts < 1:
             continue
         h = np.empty((every, every))  # the disks of contacts come before those of insulated walls
-        if not _resistances(offsets[p], offsets[p + 1], normals, axes, alpha, cutting, tables, own, h):
+        if not _resistances(p, disks, tables, own, h):
             return p
         h /= scales[p]
         for a in range(contacts):
@@ -301,11 +310,7 @@ def _fill(
 
 @njit(cache=True)
 def _potentials(
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
-    cutting: NDArray[np.bool_],
+    disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
     scales: NDArray[np.float64],
@@ -314,12 +319,12 @@ def _potentials(
 ) -> None:
     """H times the flux modes, of mode 0."""
     modes = flows.shape[1]
-    for p in range(offsets.size - 1):
-        first, n = offsets[p], offsets[p + 1] - offsets[p]
+    for p in range(disks.offsets.size - 1):
+        first, n = disks.offsets[p], disks.offsets[p + 1] - disks.offsets[p]
         if not np.any(flows[first : first + n]):
             continue
         h = np.empty((n * modes, n * modes))
-        _resistances(first, first + n, normals, axes, alpha, cutting, tables, own, h)
+        _resistances(p, disks, tables, own, h)
         for i in range(n):
             for j in range(n):
                 for k in range(modes):
