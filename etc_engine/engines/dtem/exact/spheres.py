@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.element import (
     Elements,
     cholesky_inverse,
@@ -51,11 +52,11 @@ class ContactDisks(NamedTuple):
         Whether the sphere ends at the disk.
     """
 
-    offsets: NDArray[np.int64]
-    normals: NDArray[np.float64]
+    offsets: Ints
+    normals: Floats
     axes: NDArray[np.complex128]
-    alpha: NDArray[np.float64]
-    cutting: NDArray[np.bool_]
+    alpha: Floats
+    cutting: Flags
 
 
 DEGREE = 2
@@ -64,7 +65,7 @@ RAISE = 1.0
 """Added to V between whole heat flows, which keeps it positive definite and changes no difference of temperatures."""
 
 
-def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
+def exact_sphere_elements(sides: ContactSides, conductivity: Floats, modes: int) -> Elements:
     """Conductivity matrices of all spheres over (contact, mode).
 
     Parameters
@@ -117,9 +118,7 @@ def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64]
     return Elements(modes, modes * sides.offsets, nodes, starts, values)
 
 
-def exact_sphere_potentials(
-    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def exact_sphere_potentials(sides: ContactSides, conductivity: Floats, flows: Floats) -> Floats:
     """Weighted mean temperature of every contact above that of its sphere's centre, shape (s,), of flows (s, modes).
 
     Parameters
@@ -154,7 +153,7 @@ def _degree(modes: int) -> int:
     return degree
 
 
-def _refuse_wide(offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
+def _refuse_wide(offsets: Ints, normals: Floats, alpha: Floats) -> None:
     refuse_overlap(offsets, normals, alpha)
     wide = np.flatnonzero(alpha > WIDEST)
     if wide.size:
@@ -165,7 +164,7 @@ def _refuse_wide(offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha
         )
 
 
-def _frames(sides: ContactSides) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+def _frames(sides: ContactSides) -> tuple[Floats, NDArray[np.complex128]]:
     """Unit directions (s, 3), exactly opposite on the two sides of a contact, and E of each, the same on both."""
     normals = sides.arms / np.linalg.norm(sides.arms, axis=1, keepdims=True)
     normals[sides.of_contacts[:, 1]] = -normals[sides.of_contacts[:, 0]]
@@ -174,7 +173,7 @@ def _frames(sides: ContactSides) -> tuple[NDArray[np.float64], NDArray[np.comple
     return normals, axes
 
 
-def _across(normals: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _across(normals: Floats) -> NDArray[np.complex128]:
     """E = e_1 + i e_2 with e_1, e_2 orthonormal and across each direction, shape (s, 3)."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, least)
@@ -188,7 +187,7 @@ def _resistances(
     disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
-    h: NDArray[np.float64],
+    h: Floats,
 ) -> bool:
     """H = (V^-1 - L)^-1 of the disks of sphere p, times kappa R; False if it is not positive definite."""
     first, last = disks.offsets[p], disks.offsets[p + 1]
@@ -224,12 +223,12 @@ def _resistances(
 
 @njit(cache=True)
 def _own_block(
-    block: NDArray[np.float64],
+    block: Floats,
     tables: ModeTables,
-    base: NDArray[np.int64],
+    base: Ints,
     at: int,
     sign: float,
-    h: NDArray[np.float64],
+    h: Floats,
 ) -> None:
     """Add a block by family, the same for cosine and sine and nothing between different m."""
     for f in range(tables.orders.size):
@@ -244,10 +243,10 @@ def _pair_block(
     pair: tuple[int, int],
     disks: ContactDisks,
     tables: ModeTables,
-    base: NDArray[np.int64],
-    means: NDArray[np.float64],
+    base: Ints,
+    means: Floats,
     at: tuple[int, int],
-    h: NDArray[np.float64],
+    h: Floats,
 ) -> None:
     """<s_a, V s_b> of all modes of two disks; cos and sin are (E + E*)/2 and (E - E*)/(2i)."""
     (a, b), (row, column) = pair, at
@@ -278,14 +277,14 @@ def _pair_block(
 
 @njit(cache=True)
 def _fill(
-    side_offsets: NDArray[np.int64],
+    side_offsets: Ints,
     disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
-    scales: NDArray[np.float64],
-    resistance: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
+    scales: Floats,
+    resistance: Floats,
+    starts: Ints,
+    values: Floats,
 ) -> int:
     """Fill the packed matrices; returns the first particle whose H is not positive definite, or -1."""
     modes = 0
@@ -313,9 +312,9 @@ def _potentials(
     disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
-    scales: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    potentials: NDArray[np.float64],
+    scales: Floats,
+    flows: Floats,
+    potentials: Floats,
 ) -> None:
     """H times the flux modes, of mode 0."""
     modes = flows.shape[1]
