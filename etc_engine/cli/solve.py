@@ -16,9 +16,7 @@ from etc_engine.cli.particle_options import (
     SampleWords,
     particle_options,
     read_sample,
-    warn_of_digits,
-    warn_of_excess,
-    warn_of_sample,
+    warn,
 )
 from etc_engine.cli.physics_options import PhysicsWords, physics_options
 
@@ -100,6 +98,7 @@ def solve_command(
     import numpy as np
 
     from etc_engine.cli.options import print_json
+    from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings
     from etc_engine.realization import field_along, find_engine
 
     asked = _Asked(**given)
@@ -122,10 +121,10 @@ def solve_command(
         _warn_of_missing_contacts(medium.links, asked.bonded, asked.bond_gap)
     gap = asked.bond_gap if asked.bonded else 0.0
     if dumped.contacts is None:
-        warn_of_digits(table, gap, bonded=asked.bonded)
+        warn(digit_warnings(table, gap, bonded=asked.bonded))
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
-    warn_of_sample(table, driven, gap)
-    warn_of_excess(result.tensor, np.append(medium.conductivity, medium.pores.conductivity))
+    warn(box_warnings(table, driven, gap))
+    warn(excess_warnings(result.tensor, np.append(medium.conductivity, medium.pores.conductivity)))
     _write(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
     if not full:
@@ -183,7 +182,10 @@ class _Asked:
         if self.conductivity is not None and self.physics.material is not None:
             raise InputError("--material and --conductivity both say what the particles are: leave one of them out")
         if self.conductivity is not None and table.conductivity is not None:
-            raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
+            raise InputError(
+                f"{particles} has a conductivity column (or --types gives one): leave --conductivity out, or "
+                "take the column out"
+            )
         if dumped is not None and (self.bonded or self.physics.contact_rule is not None):
             raise InputError("--contacts and --contact-angle or --rule say how wide contacts are: give one of them")
         solid = self.physics.solid() if self.conductivity is None else self.conductivity

@@ -120,14 +120,16 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
 
 def _warn_of_digits(study: NetworkStudy, done: Transient) -> None:
     """What the reader decided, and contacts that the printed digits of the first or the last frame do not decide."""
-    from etc_engine.cli.particle_options import warn_of_digits
+    from etc_engine.cli.particle_options import warn
+    from etc_engine.medium.rules import find_rule
+    from etc_engine.medium.sample_warnings import digit_warnings
 
     for note in done.tables[0].notes if done.tables else ():
         click.echo(f"etc-engine: note: {note}", err=True)
     values = study.contacts.values()
-    bonded = study.contacts.rule != "overlap"
+    bonded = "bond_gap" in find_rule(study.contacts.rule).keys
     for table in dict.fromkeys((done.tables[0], done.tables[-1]) if done.tables else ()):
-        warn_of_digits(table, values.get("bond_gap", 0.0) if bonded else 0.0, bonded=bonded)
+        warn(digit_warnings(table, values.get("bond_gap", 0.0) if bonded else 0.0, bonded=bonded))
 
 
 def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:

@@ -13,6 +13,8 @@ from pydantic import Field, model_validator
 from etc_engine.box import AXES
 from etc_engine.errors import EtcError, InputError, StudyError
 from etc_engine.materials import find_solid
+from etc_engine.medium.rules import RULES
+from etc_engine.medium.sample_warnings import box_warnings, digit_warnings
 from etc_engine.particle_files.collection import PackingSource, find_sources
 from etc_engine.particle_files.sample import Range, Sample
 from etc_engine.realization import RealizationSpec
@@ -156,6 +158,16 @@ class FileStudy(Study):
     def for_realization(self, spec: RealizationSpec, realization: int) -> RealizationSpec:
         """The specification with the packing of a realization."""
         return replace(spec, packing=self.packing.source(realization))
+
+    def remarks(self) -> tuple[str, ...]:
+        """Digits that do not decide on contacts, bare walls and cut particles of the first packing."""
+        source = self.packing.source(0)
+        table = source.read()
+        bonded = "bond_gap" in RULES[self.contacts.rule].keys
+        gap = min(self.values("bond_gap"), default=0.0) if bonded else 0.0
+        walls = [] if self.pores_conduct[0] else [k for k, flag in enumerate(table.packing.box.periodic) if not flag]
+        found = [*table.notes, *digit_warnings(table, gap, bonded=bonded), *box_warnings(table, walls, gap)]
+        return tuple(f"{source.name}: {sentence}" for sentence in found)
 
     def realization_coordinates(self) -> dict[str, tuple[list[Any], str]]:
         """The file and the frame of each realization."""

@@ -233,6 +233,10 @@ class Study(StudyFile):
         """The specification of one of the realizations; packings that are made differ in their random stream alone."""
         return spec
 
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should know before the sweep runs."""
+        return ()
+
     def realization_coordinates(self) -> dict[str, tuple[list[Any], str]]:
         """Coordinates along the realizations, with their meaning."""
         return {}

@@ -90,7 +90,7 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
         write_study_file(folder, study.identity(), study.digest())
     record = json.dumps(asdict(this_run(run, ranks, lock.holder.job)))
     write_atomically(folder / f"{run}.run", record.encode())
-    return Claim(study, text, output, run, remarks=remarks)
+    return Claim(study, text, output, run, remarks=(*remarks, *study.remarks()))
 
 
 def new_run() -> str:

@@ -12,7 +12,7 @@ from etc_engine.realization import Status
 from etc_engine.study.conditions import derived_conductivities
 from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.sweep import Study
-from etc_engine.sweep.statistics import summarize
+from etc_engine.sweep.statistics import interval, summarize
 from etc_engine.sweep.table import CELL_VARIABLES, MEASURES, UNIT_VARIABLES, Table
 
 if TYPE_CHECKING:
@@ -32,6 +32,20 @@ STATISTICS = {
     "ci_low": "lower end of the confidence interval of the mean conductivity",
     "ci_high": "upper end of the confidence interval of the mean conductivity",
 }
+PERCOLATION = {
+    "percolating_fraction": ("percolating_fraction", "fraction of the realizations that percolate"),
+    "percolating_fraction_ci_low": ("fraction_low", "lower end of the interval of the percolating fraction"),
+    "percolating_fraction_ci_high": ("fraction_high", "upper end of the interval of the percolating fraction"),
+    "conductivity_mean_percolating": ("percolating_mean", "mean conductivity of the realizations that percolate"),
+    "conductivity_mean_percolating_ci_low": ("percolating_low", "lower end of the interval of that conductivity"),
+    "conductivity_mean_percolating_ci_high": ("percolating_high", "upper end of the interval of that conductivity"),
+}
+"""Variable of a direction -> field of `etc_engine.sweep.statistics.Interval`, meaning."""
+
+INTERVAL_COMMENT = (
+    "of a diagonal component: Student t, given that all percolate, where all realizations do; where some do not, "
+    "the intervals of their fraction and of the mean of the others combined. Off the diagonal: Student t"
+)
 DERIVED = "of the material, or of the gas as a continuum, at the temperature and pressure"
 STREAM_COMMENT = (
     "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
@@ -66,7 +80,7 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
-    if "exact" in study.methods:
+    if "exact" in study.methods or study.conduction.bounds:
         meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
         dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
@@ -143,19 +157,33 @@ def _add_statistics(dataset: xarray.Dataset, swept: tuple[str, ...], cells: Valu
     shape, tensor = valid.shape[:-1], cells["conductivity"].shape[-2:]
     count = np.zeros(shape, np.int64)
     values = {name: np.full(shape + tensor, np.nan) for name in STATISTICS}
+    parts = {name: np.full(shape + tensor[:1], np.nan) for name in PERCOLATION}
     for place in np.ndindex(*shape):
-        summary = summarize(cells["conductivity"][place][valid[place]], confidence)
+        samples = cells["conductivity"][place][valid[place]]
+        summary = summarize(samples, confidence)
         count[place] = summary.count
         for name in STATISTICS:
             values[name][place] = getattr(summary, name)
+        for k in range(tensor[0]):
+            if not summary.count or not np.isfinite(samples[:, k, k]).all():
+                continue
+            found = interval(np.maximum(samples[:, k, k], 0.0), confidence)
+            for name, (field, _) in PERCOLATION.items():
+                parts[name][(*place, k)] = getattr(found, field)
+            if found.percolating_fraction < 1.0:
+                values["ci_low"][(*place, k, k)], values["ci_high"][(*place, k, k)] = found.low, found.high
     for name, long_name in STATISTICS.items():
         attributes = _conductivity_attributes(long_name)
         if name.startswith("ci"):
-            attributes |= {
-                "confidence_level": confidence,
-                "comment": "Student t with count - 1 degrees of freedom",
-            }
+            attributes |= {"confidence_level": confidence, "comment": INTERVAL_COMMENT}
         dataset[f"conductivity_{name}"] = (swept + TENSOR, values[name], attributes)
+    for name, (_, meaning) in PERCOLATION.items():
+        attributes = _conductivity_attributes(meaning)
+        if name.startswith("percolating"):
+            attributes["units"] = "1"
+        if "_ci_" in name:
+            attributes |= {"confidence_level": confidence}
+        dataset[name] = ((*swept, TENSOR[0]), parts[name], attributes)
     dataset["count"] = (
         swept,
         count,

@@ -28,7 +28,7 @@ from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
 from etc_engine.study.transient import FileTable, NetworkStudy, refuse_endless
 from etc_engine.study.walls import plain
-from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
+from etc_engine.transient.moving import MovingState, Stepping, ThermalExpansion, march_trajectory, named_frame
 from etc_engine.transient.selection import conductivity_of, initial_of, rows_of
 from etc_engine.transient.states import State, claimed_states, write_state
 
@@ -186,6 +186,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
         raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, trajectory.tables[0])
 
+    told = _fraction(progress, trajectory.times[0], trajectory.times[-1])
+
     def contacts(packing: ParticlePacking) -> ContactNetwork:
         return _contacts(study, packing)
 
@@ -198,11 +200,8 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
             initial_of(study, trajectory.tables[0]),
             heat_capacity=np.asarray(study.particles.heat_capacity, dtype=np.float64),
             expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
-            scheme=time.scheme,
-            steps=time.steps or 1,
-            tolerance=time.tolerance,
+            stepping=Stepping(time.scheme, time.steps or 1, time.tolerance, progress=told),
             restart=restart,
-            progress=_fraction(progress, trajectory.times[0], trajectory.times[-1]),
         )
 
     refuse_endless(time, trajectory.times)

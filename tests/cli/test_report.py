@@ -79,6 +79,7 @@ def test_the_page_holds_everything_itself(result, tmp_path, etc_engine):
         "conductivity",
         "statistics",
         "models",
+        "sensitivity",
         "realizations",
         "size",
         "histograms",

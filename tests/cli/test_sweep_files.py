@@ -151,3 +151,16 @@ def test_no_files_and_no_folder_are_named(etc_engine, beds, tmp_path):
     assert "no file is found by 'none/*.dump'" in etc_engine("sweep", study, "-o", tmp_path / "out.nc").stderr
     with pytest.raises(StudyError, match="packings in files are read by the command sweep"):
         parse_study(text)
+
+
+def test_a_sweep_says_what_its_files_do_not_decide(etc_engine, beds, tmp_path):
+    """Bonds up to a gap that some pairs have to the printed digit."""
+    for seed in (11, 12, 13):
+        path = tmp_path / "beds" / f"bed{seed}.dump"
+        lines = path.read_text().splitlines()
+        rows = [" ".join([*line.split()[:2], *(f"{float(x):.3g}" for x in line.split()[2:])]) for line in lines[9:]]
+        path.write_text("\n".join([*lines[:9], *rows, ""]))
+    done = etc_engine("sweep", beds(), "-o", tmp_path / "out.nc")
+    assert done.returncode == 0, done.stderr
+    assert "beds/bed11.dump: the file prints too few digits" in done.stderr
+    assert "taken for disks" in done.stderr
