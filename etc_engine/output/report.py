@@ -123,9 +123,10 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
 def _conditions(study: Mapping[str, Any]) -> dict[str, str]:
     """Solid, gas and radiation, where the study has them by name."""
     gas, emissivity = study["pores"].get("gas"), study["radiation"].get("emissivity")
+    material = study["particles"].get("material")
     fractions = gas.items() if isinstance(gas, dict) else ()
     found = {
-        "particles": study["particles"].get("material") or "",
+        "particles": material if isinstance(material, str) else "a table of the study" if material else "",
         "pores": ", ".join(f"{share:g} {name}" for name, share in fractions) if fractions else gas or "",
     }
     numbers = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ def make_media(
     return media
 
 
-def solid_conductivity(material: str, values: Values) -> float:
+def solid_conductivity(material: str | Mapping[str, Any], values: Values) -> float:
     """Conductivity of a solid by name at the temperature among the values [W/(m K)]."""
     return float(find_solid(material).conductivity.at(values["temperature"]))
 
