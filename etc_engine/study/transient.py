@@ -49,6 +49,11 @@ class FileTable(StudyTable):
         default=None, description="two or three positive edge lengths, of a CSV file"
     )
     periodic: Word | None = Field(default=None, description="a combination of the letters x, y, z, of a CSV file")
+    crop: tuple[str, ...] | None = Field(
+        default=None, description="ranges low:high of each axis to keep, '' for all, such as ['', '0:0.024']"
+    )
+    dimension: Literal[2, 3] | None = Field(default=None, description="2 or 3, where the file cannot say")
+    radius_column: Word | None = Field(default=None, description="the name of the column of radii")
 
 
 def _made_or_read(packing: object) -> str:
@@ -243,6 +248,8 @@ class NetworkStudy(StudyFile):
         file = self.packing
         if not isinstance(file, FileTable) or "frames" in file.model_fields_set or file.box is not None:
             raise ValueError("motion: it takes all frames of a dump, the file of packing.files, and the dump's own box")
+        if file.crop is not None:
+            raise ValueError("packing.crop: particles would come and go with [motion], take it out")
         if self.time.times:
             raise ValueError("time.times: with [motion] the output times are those of the frames, take them out")
         if self.time.scheme != "adaptive" and self.time.steps is None:

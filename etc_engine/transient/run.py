@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from etc_engine.box import Box, parse_periodic
+from etc_engine.box import parse_periodic
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.medium.medium import Medium
@@ -29,7 +29,7 @@ from etc_engine.solvers.overflow import representable_numbers
 from etc_engine.study.transient import FileTable, NetworkStudy, refuse_endless
 from etc_engine.study.walls import plain
 from etc_engine.transient.moving import MovingState, Stepping, ThermalExpansion, march_trajectory, named_frame
-from etc_engine.transient.selection import conductivity_of, initial_of, rows_of
+from etc_engine.transient.selection import conductivity_of, initial_of, part_of, rows_of
 from etc_engine.transient.states import State, claimed_states, write_state
 
 Progress = Callable[[float], None]
@@ -178,7 +178,7 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     path = folder / file.files
     if not path.exists():
         raise StudyError(f"packing.files: there is no file {path}")
-    trajectory = read_trajectory(path, motion.timestep)
+    trajectory = read_trajectory(path, motion.timestep, part_of(file))
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
         raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
@@ -254,10 +254,9 @@ def _particles(study: NetworkStudy, folder: Path) -> ParticleTable:
         path = folder / words.files
         if not path.exists():
             raise StudyError(f"packing.files: there is no file {path}")
-        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", len(words.box)))
-        if box is None and not format_to_read(path).brings_box:
+        if words.box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
-        return read_particles(path, box, None if words.frames == "last" else words.frames)
+        return read_particles(path, frame=None if words.frames == "last" else words.frames, sample=part_of(words))
     spec = words.spec(words.density, radius_growth=study.contacts.rule == "overlap")
     return ParticleTable(pack(spec, np.random.default_rng(study.seed)))
 

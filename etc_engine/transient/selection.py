@@ -6,8 +6,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import StudyError
+from etc_engine.particle_files.sample import Sample
 from etc_engine.particle_files.table import ParticleTable
-from etc_engine.study.transient import Gradient, NetworkStudy, Source
+from etc_engine.study.file_packings import sample_of
+from etc_engine.study.transient import FileTable, Gradient, NetworkStudy, Source
+
+
+def part_of(words: FileTable) -> Sample:
+    """The part of a particle file that a study asks for.
+
+    Raises
+    ------
+    InputError
+    """
+    return sample_of({**words.model_dump(), "file_box": words.box, "file_periodic": words.periodic})
 
 
 def rows_of(source: Source, table: ParticleTable, place: str) -> NDArray[np.int64]:

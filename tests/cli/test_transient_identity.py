@@ -91,3 +91,15 @@ def test_names_that_are_not_there_are_refused(run, words, said):
     done, _ = run(**{"source": "ids = [10]", **words})
     assert done.returncode == 2
     assert said in done.stderr
+
+
+def test_a_part_of_the_file(run, tmp_path):
+    _, out = run("ids = [10]")
+    text = (tmp_path / "t.toml").read_text()
+    (tmp_path / "t.toml").write_text(text.replace('"p.dump"', '"p.dump", crop = ["0.9:2.6", ""]'))
+    from etc_engine.cli import run as command
+
+    assert command(["transient", str(tmp_path / "t.toml"), "-o", str(out), "--overwrite"]) == 0
+    with xarray.open_dataset(out) as data:
+        assert data["particle"].values.tolist() == [10, 20]
+        np.testing.assert_allclose(data.attrs["box"], [1.7, 1.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -144,7 +145,7 @@ def _family(
     media: Sequence[Medium], rows: Sequence[int], links: FacetLinks, conduction: Conduction
 ) -> dict[int, Result]:
     """Results of the media that could be solved together."""
-    axes, box = conduction.axes, links.packing.box
+    axes, box, start = conduction.axes, links.packing.box, time.perf_counter()
     try:
         materials = [medium_material(media[row], links) for row in rows]
         by_group = {
@@ -153,8 +154,20 @@ def _family(
         }
     except EtcError:
         return {}
+    each = (time.perf_counter() - start) / len(rows)
+    unknowns = max(
+        report.unknowns
+        for members in by_group.values()
+        for member in members
+        if member.solution is not None
+        for report in member.solution.reports
+    )
     return {
-        row: _joined(links, {group: members[place] for group, members in by_group.items()})
+        row: replace(
+            _joined(links, {group: members[place] for group, members in by_group.items()}),
+            unknowns=unknowns,
+            seconds=each,
+        )
         for place, row in enumerate(rows)
     }
 
@@ -174,7 +187,7 @@ def _joined(links: FacetLinks, members: Mapping[tuple[int, ...], FamilyMember]) 
     return EffectiveConductivity(
         tensor,
         tuple(spanned),
-        max((report.unknowns for report in reports), default=0),
+        0,
         max((report.iterations for report in reports), default=0),
         max([member.relative_error for member in members.values()] + [r.relative_energy_error for r in reports]),
         solutions if full else (),
