@@ -8,7 +8,7 @@
 #
 # PBS leaves a job a few seconds at its time limit, so the ranks get SIGTERM from here, two minutes earlier
 # (ETC_SECONDS, to be set with another walltime). They keep what is finished and end with status 75; the
-# script then submits itself again and goes on.
+# script then submits itself again and continues.
 set -uo pipefail
 
 cd "${PBS_O_WORKDIR:-.}" || exit 2

@@ -10,7 +10,7 @@
 # A study as a Slurm job:  sbatch [--nodes=N] jobs/slurm.sh studies/NAME/study.toml out.nc
 #
 # Two minutes before the time limit every rank gets SIGTERM, keeps what is finished and ends with status 75;
-# the job then queues itself again and goes on. A node that fails, or a preemption, does the same.
+# the job then queues itself again and continues. A node that fails, or a preemption, does the same.
 set -uo pipefail
 
 study=${1:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}

@@ -33,7 +33,7 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     from etc_engine.comparison import evaluate_models, fit_models, model_lines
     from etc_engine.durable.files import replacing
     from etc_engine.errors import InputError
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     if output is not None:
         check_picture(output)
@@ -208,7 +208,7 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
 
 
 def _print_fits(fits: tuple[Fit, ...]) -> None:
-    """Fits with constants, one a line; reasons why there is none, once each."""
+    """Fits with constants, one per line; reasons why there is none, once each."""
     reasons: dict[str, str] = {}
     for fit in fits:
         where = ", ".join(f"{key} {value:g}" if key != "method" else str(value) for key, value in fit.selection.items())

@@ -25,7 +25,7 @@ def export_command(result: Path, form: str, output: Path | None, fixed: tuple[st
     from etc_engine.durable.files import replacing
     from etc_engine.errors import InputError
     from etc_engine.output.exports import EXPORTS, curves_of
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     at: dict[str, str] = {}
     for setting in fixed:

@@ -113,15 +113,9 @@ def _load(path: Path) -> xarray.Dataset | None:
         if path.suffix == ".nc":
             raise OutputError(f"cannot read {path}: it is damaged or no netCDF file")
         return None
-    import xarray
+    from etc_engine.sweep.result_file import load_netcdf
 
-    try:
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
-            return stored.load()
-    except OSError as error:
-        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
-    except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
-        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
+    return load_netcdf(path)
 
 
 def _sweep(dataset: xarray.Dataset) -> dict[str, Any]:

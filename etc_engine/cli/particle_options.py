@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import wraps
 from math import inf
@@ -14,8 +14,6 @@ import click
 from etc_engine.errors import InputError
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from etc_engine.particle_files.sample import Range, Sample
     from etc_engine.particle_files.table import ParticleTable
 
@@ -29,6 +27,7 @@ OPTIONS = (
     ),
     click.option("--frame", type=int, help="Frame of a file with several, from 0; the last one by default."),
     click.option("--dimension", type=click.Choice(("2", "3")), help="2: disks, 3: spheres; where the file cannot say."),
+    click.option("--types", help="Conductivity of each type of particle of the file [W/(m K)], such as 1=2.4,2=16."),
     click.option("--radius-column", help="Name of the column of radii, where it is not radius or diameter."),
 )
 
@@ -43,6 +42,7 @@ class SampleWords:
     frame: int | None = None
     dimension: str | None = None
     radius_column: str | None = None
+    types: str | None = None
 
     def sample(self) -> Sample:
         """What the words say.
@@ -132,80 +132,28 @@ def read_sample(path: Path, words: SampleWords, *, unknown_periodic: bool = Fals
     table = read_particles(path, sample=replace(words.sample(), unknown_periodic=unknown_periodic))
     for note in table.notes:
         click.echo(f"etc-engine: note: {note}", err=True)
-    return table
+    return table if words.types is None else _by_type(table, words.types, path)
 
 
-def warn(message: str) -> None:
-    """One line of warning."""
-    click.echo(f"etc-engine: warning: {message}", err=True)
+def _by_type(table: ParticleTable, word: str, path: Path) -> ParticleTable:
+    """The particles with the conductivities of their types."""
+    from etc_engine.realization.media import own_conductivities
+
+    if table.conductivity is not None:
+        raise InputError(f"{path} has a conductivity column: leave --types out, or take the column out")
+    types: dict[str, float | str] = {}
+    for part in word.split(","):
+        name, mark, value = part.partition("=")
+        try:
+            if not mark or name.strip() in types:
+                raise ValueError(part)
+            types[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(f"--types takes TYPE=CONDUCTIVITY words such as 1=2.4,2=16, found {part!r}") from None
+    return replace(table, conductivity=own_conductivities(table, types, {}))
 
 
-def warn_of_digits(table: ParticleTable, gap: float, *, bonded: bool) -> None:
-    """Contacts that the printed digits of the file do not decide."""
-    from etc_engine.particle_files.precision import doubtful_contacts
-
-    doubt = doubtful_contacts(table, gap)
-    if doubt is not None:
-        warn(doubt.sentence(gap, bonded=bonded))
-
-
-def warn_of_sample(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) -> None:
-    """Walls that the particles do not reach, and walls that go through them.
-
-    Parameters
-    ----------
-    table : ParticleTable
-    driven : sequence of int
-        Axes along which walls drive the heat.
-    gap : float
-        Largest gap of a contact with a wall, in radii.
-    """
-    import numpy as np
-
-    from etc_engine.box import AXES
-    from etc_engine.structure.filling import find_filling, free_walls
-
-    packing = table.packing
-    filling = find_filling(packing)
-    origin = table.origin or (0.0,) * packing.dimension
-    low, high = packing.radii.min(), packing.radii.max()
-    free = set(free_walls(packing, filling).tolist())
-    for wall in range(2 * packing.dimension):
-        axis, end = divmod(wall, 2)
-        place = f"{AXES[axis]} = {origin[axis] + end * packing.box.lengths[axis]:g}"
-        distance = filling.free[wall]
-        if axis in driven and distance > gap * low and not np.isnan(distance):
-            warn(
-                f"nothing touches the driven wall {place}: the nearest surface is {distance:.3g} m away "
-                f"({distance / high:.2g} of the largest radius), so the wall drives no heat; see --crop and --box"
-            )
-        elif wall in free:
-            warn(
-                f"the box is larger than the sample: between the wall {place} and the nearest particle "
-                f"{distance:.3g} m are free, which count as sample; see --crop and --box"
-            )
-    deep = filling.deep_cuts
-    made = np.array(table.cropped or (False,) * deep.size)
-    if deep[~made].any():
-        where = ", ".join(
-            f"{AXES[k // 2]} = {origin[k // 2] + (k % 2) * packing.box.lengths[k // 2]:g} ({deep[k]})"
-            for k in np.flatnonzero((deep > 0) & ~made)
-        )
-        warn(
-            f"walls go through {deep[~made].sum()} particles by more than half a radius: {where}; the box may be "
-            "wrapped around the centres (flag s): give the faces of the container with --box low:high,..."
-        )
-    if deep[made].any():
-        warn(f"the crop cuts {deep[made].sum()} particles by more than half a radius: its walls touch their middle")
-
-
-def warn_of_excess(tensor: ArrayLike, conductivity: ArrayLike) -> None:
-    """A sample conducts no better than the best of its parts; where it does, the box or the contacts are wrong."""
-    import numpy as np
-
-    best, most = float(np.max(conductivity)), float(np.nanmax(np.diag(np.atleast_2d(tensor))))
-    if most > best * (1.0 + 1e-9):
-        warn(
-            f"the conductivity {most:.6g} W/(m K) exceeds that of the best particle, {best:.6g}: walls or contacts go "
-            "through particles, see --box and the contact rule"
-        )
+def warn(messages: Iterable[str]) -> None:
+    """A line of warning for each message."""
+    for message in messages:
+        click.echo(f"etc-engine: warning: {message}", err=True)

@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from etc_engine.medium.medium import Pores
+    from etc_engine.medium.conditions import Conditions
+    from etc_engine.medium.medium import Medium, Pores
     from etc_engine.medium.network import ContactNetwork
     from etc_engine.packing.particles import ParticlePacking
 
 OPTIONS = (
-    click.option("--rule", help="Contact rule: overlap, bonded, hertz or load; by default what the options fit."),
+    click.option(
+        "--rule", help="Contact rule: overlap, bonded, radius, hertz or load; by default what the options fit."
+    ),
+    click.option("--contact-radius", type=float, help="Radius of bonded contacts [m], instead of --contact-angle."),
     click.option("--youngs-modulus", type=float, help="Young's modulus of the particles [Pa]."),
     click.option("--poisson-ratio", type=float, help="Poisson's ratio of the particles."),
     click.option(
@@ -29,12 +33,17 @@ OPTIONS = (
     click.option("--temperature", type=float, help="Temperature of properties and radiation [K]."),
     click.option("--accommodation", type=float, help="Thermal accommodation coefficient of the surfaces, up to 1."),
     click.option("--emissivity", type=float, help="Emissivity of the particles: facing surfaces radiate."),
+    click.option(
+        "--wall-temperatures",
+        help="Temperatures of the walls at the low and the far end [K], 900:600: properties follow the local one.",
+    ),
 )
 
 
 NEEDED: dict[str, tuple[str, ...]] = {
     "overlap": (),
     "bonded": ("contact_angle",),
+    "radius": ("contact_radius",),
     "coordination": ("contact_angle", "coordination"),
     "hertz": (),
     "softened": ("youngs_modulus", "poisson_ratio"),
@@ -48,6 +57,7 @@ class PhysicsWords:
     """What the options say of contacts, solid and pores."""
 
     rule: str | None = None
+    contact_radius: float | None = None
     youngs_modulus: float | None = None
     poisson_ratio: float | None = None
     simulated_modulus: float | None = None
@@ -59,11 +69,79 @@ class PhysicsWords:
     temperature: float | None = None
     accommodation: float | None = None
     emissivity: float | None = None
+    wall_temperatures: str | None = None
+
+    @property
+    def walls(self) -> tuple[float, float] | None:
+        """Temperatures of the walls at the low and the far end [K].
+
+        Raises
+        ------
+        InputError
+        """
+        if self.wall_temperatures is None:
+            return None
+        from etc_engine.errors import InputError
+
+        try:
+            low, high = (float(word) for word in self.wall_temperatures.split(":"))
+        except ValueError:
+            raise InputError(
+                f"--wall-temperatures takes two temperatures [K], such as 900:600: found {self.wall_temperatures!r}"
+            ) from None
+        return low, high
+
+    @property
+    def reference(self) -> float | None:
+        """The temperature asked for; without one the mean of the walls."""
+        if self.temperature is not None or self.walls is None:
+            return self.temperature
+        return 0.5 * sum(self.walls)
+
+    @property
+    def conditions(self) -> Conditions:
+        """Gas, temperature, pressure and radiation.
+
+        Raises
+        ------
+        InputError
+        """
+        from etc_engine.medium.conditions import Conditions
+
+        given = self.gas, self.pressure, self.accommodation, self._atomic_mass(), self.emissivity
+        return Conditions(self.reference, *given)
+
+    def between_walls(self, medium: Medium, axis: int) -> dict[str, Any]:
+        """Record of the conduction between the walls at the local temperature; empty without their temperatures.
+
+        Raises
+        ------
+        InputError
+            If nothing follows the temperature.
+        """
+        if self.walls is None:
+            return {}
+        from etc_engine.engines.dtem.between_walls import solve_between_walls
+        from etc_engine.errors import InputError
+        from etc_engine.materials import find_solid
+
+        if self.material is None and self.gas is None and not self.emissivity:
+            raise InputError("--wall-temperatures need --material, --gas or --emissivity: nothing else follows them")
+        solid = None if self.material is None else find_solid(self.material).conductivity.at
+        found = solve_between_walls(medium, axis, self.walls, self.conditions, solid)
+        return {
+            "conductivity_between_walls": found.conductivity,
+            "heat_flow": found.heat_flow,
+            "heat_imbalance": found.imbalance,
+            "nonlinear_iterations": found.iterations,
+        }
 
     @property
     def contact_rule(self) -> str | None:
-        """The rule asked for; ``load`` if only a load is given."""
-        return "load" if self.rule is None and self.load is not None else self.rule
+        """The rule asked for; ``radius`` or ``load`` if only a contact radius or a load is given."""
+        if self.rule is not None:
+            return self.rule
+        return "radius" if self.contact_radius is not None else "load" if self.load is not None else None
 
     def network(self, packing: ParticlePacking, half_angle: float | None, bond_gap: float) -> ContactNetwork:
         """Contacts by the rule asked for.
@@ -80,6 +158,7 @@ class PhysicsWords:
         rule = find_rule(word)
         values = {
             "contact_angle": half_angle,
+            "contact_radius": self.contact_radius,
             "youngs_modulus": self.youngs_modulus,
             "poisson_ratio": self.poisson_ratio,
             "simulated_modulus": self.simulated_modulus,
@@ -136,22 +215,11 @@ class PhysicsWords:
             If a gas comes beside a conductivity, or something that it needs is missing.
         """
         from etc_engine.errors import InputError
-        from etc_engine.medium.conditions import Conditions, pores_at
+        from etc_engine.medium.conditions import pores_at
 
         if self.gas is not None and conductivity > 0.0:
             raise InputError("--gas and --pore-conductivity both say what fills the pores: leave one of them out")
-        return pores_at(
-            Conditions(
-                self.temperature,
-                self.gas,
-                self.pressure,
-                self.accommodation,
-                self._atomic_mass(),
-                self.emissivity,
-            ),
-            packing,
-            conductivity,
-        )
+        return pores_at(self.conditions, packing, conductivity)
 
     def solid(self) -> float | None:
         """Conductivity of the material named, at the temperature asked for; None without a name.
@@ -165,9 +233,9 @@ class PhysicsWords:
         from etc_engine.errors import InputError
         from etc_engine.materials import find_solid
 
-        if self.temperature is None:
+        if self.reference is None:
             raise InputError("--material needs --temperature: its conductivity depends on it")
-        return float(find_solid(self.material).conductivity.at(self.temperature))
+        return float(find_solid(self.material).conductivity.at(self.reference))
 
     def _atomic_mass(self) -> float | None:
         from etc_engine.materials import find_solid

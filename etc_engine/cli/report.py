@@ -30,7 +30,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     )
     from etc_engine.durable.files import replacing
     from etc_engine.output.report import report_page
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     check_picture(output.with_suffix(".png"))
     check_place(output, *results)

@@ -31,11 +31,11 @@ def rerun_command(file: Path, density: float | None, realization: int, as_json: 
 def compare_again(
     file: Path, density: float | None, realization: int, as_json: bool, realize: Realize | None = None
 ) -> int:
-    """Run a realization again and tell the result; ``realize`` may be a stand-in."""
+    """Run a realization again and report the result; ``realize`` may be a stand-in."""
     from etc_engine import realization as real
     from etc_engine.durable.provenance import versions
-    from etc_engine.sweep.dataset import open_dataset
     from etc_engine.sweep.rerun import rerun
+    from etc_engine.sweep.result_file import open_dataset
 
     dataset = open_dataset(file)
     comparison = rerun(dataset, density, realization, realize or real.realize)

@@ -16,9 +16,7 @@ from etc_engine.cli.particle_options import (
     SampleWords,
     particle_options,
     read_sample,
-    warn_of_digits,
-    warn_of_excess,
-    warn_of_sample,
+    warn,
 )
 from etc_engine.cli.physics_options import PhysicsWords, physics_options
 
@@ -100,6 +98,7 @@ def solve_command(
     import numpy as np
 
     from etc_engine.cli.options import print_json
+    from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings
     from etc_engine.realization import field_along, find_engine
 
     asked = _Asked(**given)
@@ -111,20 +110,22 @@ def solve_command(
     elastic = asked.physics.youngs_modulus, asked.physics.poisson_ratio
     medium = asked.medium(table, particles, dumped.network(table, words.frame, *elastic))
     axes = _load_axes(asked.axis, medium)
+    medium = _trimmed(medium, table, axes)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
+    between = asked.between_walls(medium, method, axes)
     field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
-    record = _record(asked, method, result, field, axes)
+    record = {**_record(asked, method, result, field, axes), **between}
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
     if not medium.pores.conduct:
-        _warn_of_missing_contacts(medium.links, asked.contact_angle, asked.bond_gap)
-    gap = 0.0 if asked.contact_angle is None else asked.bond_gap
+        _warn_of_missing_contacts(medium.links, asked.bonded, asked.bond_gap)
+    gap = asked.bond_gap if asked.bonded else 0.0
     if dumped.contacts is None:
-        warn_of_digits(table, gap, bonded=asked.contact_angle is not None)
+        warn(digit_warnings(table, gap, bonded=asked.bonded))
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
-    warn_of_sample(table, driven, gap)
-    warn_of_excess(result.tensor, np.append(medium.conductivity, medium.pores.conductivity))
+    warn(box_warnings(table, driven, gap))
+    warn(excess_warnings(result.tensor, np.append(medium.conductivity, medium.pores.conductivity)))
     _write(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
     if not full:
@@ -160,10 +161,15 @@ class _Asked:
         if self.method == "pipe" or self.pipe_resistance is not None:
             found = "--method pipe" if self.method == "pipe" else f"--pipe-resistance {self.pipe_resistance}"
             raise InputError(f"{found} is now --engine pipe --method {self.pipe_resistance or 'chord'}")
-        if self.contact_angle is None and self.bond_gap != BOND_GAP and self.physics.contact_rule != "load":
+        if not self.bonded and self.bond_gap != BOND_GAP and self.physics.contact_rule != "load":
             raise InputError("--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap")
         if self.contact_resistance > 0.0 and self.physics.roughness is not None:
             raise InputError("--contact-resistance and --roughness both resist at contacts: leave one of them out")
+
+    @property
+    def bonded(self) -> bool:
+        """Whether contacts are bonds of a given width."""
+        return self.contact_angle is not None or self.physics.contact_radius is not None
 
     def medium(self, table: ParticleTable, particles: Path, dumped: ContactNetwork | None) -> Medium:
         """The particles of a file with contacts, those of a contact dump if there is one, and materials."""
@@ -177,8 +183,11 @@ class _Asked:
         if self.conductivity is not None and self.physics.material is not None:
             raise InputError("--material and --conductivity both say what the particles are: leave one of them out")
         if self.conductivity is not None and table.conductivity is not None:
-            raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
-        if dumped is not None and (self.contact_angle is not None or self.physics.contact_rule is not None):
+            raise InputError(
+                f"{particles} has a conductivity column (or --types gives one): leave --conductivity out, or "
+                "take the column out"
+            )
+        if dumped is not None and (self.bonded or self.physics.contact_rule is not None):
             raise InputError("--contacts and --contact-angle or --rule say how wide contacts are: give one of them")
         solid = self.physics.solid() if self.conductivity is None else self.conductivity
         given = 1.0 if solid is None else solid
@@ -206,6 +215,16 @@ class _Asked:
         if "error_estimate" in engine.find_method(method).options and medium.packing.count <= ESTIMATED:
             options["error_estimate"] = True
         return effective_conductivity(medium, engine=engine.name, method=method, axes=axes, **options)
+
+    def between_walls(self, medium: Medium, method: str, axes: tuple[int, ...]) -> dict[str, Any]:
+        """Record of the conduction between two walls at the local temperature, if it is asked for."""
+        from etc_engine.errors import InputError
+
+        if self.physics.walls is None:
+            return {}
+        if method != "facets" or len(axes) != 1:
+            raise InputError("--wall-temperatures take method facets and one --axis")
+        return self.physics.between_walls(medium, axes[0])
 
 
 def _load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:
@@ -279,7 +298,27 @@ def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any], tabl
             save_field(files.enter_context(replacing(outputs.plot)), field, caption)
 
 
-def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | None, bond_gap: float) -> None:
+def _trimmed(medium: Medium, table: ParticleTable, axes: tuple[int, ...]) -> Medium:
+    """The medium as the driven walls of a crop leave it; the user is told what they go through."""
+    import numpy as np
+
+    from etc_engine.medium.cut_contacts import trim_crop
+
+    driven = np.repeat(np.isin(np.arange(medium.dimension), axes), 2)
+    walls = np.array(table.cropped or (False,) * driven.size) & driven
+    if not (medium.links.geometric and walls.any()):
+        return medium
+    network, deep, cut = trim_crop(medium.links, walls)
+    if deep:
+        text = f"the crop goes through the middle of {deep} particles; their cut is taken at 75 degrees"
+        click.echo(f"etc-engine: warning: {text}", err=True)
+    if cut:
+        text = f"the crop goes through {cut} contacts between particles, which are left out"
+        click.echo(f"etc-engine: warning: {text}", err=True)
+    return medium.with_network(network)
+
+
+def _warn_of_missing_contacts(network: ContactNetwork, bonded: bool, bond_gap: float) -> None:
     """A packing without a single contact is most likely a misunderstanding about the contact rule."""
     from etc_engine.packing.neighbors import neighbor_pairs
 
@@ -290,8 +329,8 @@ def _warn_of_missing_contacts(network: ContactNetwork, contact_angle: float | No
     if not near.count:
         return
     closest = float((near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))).min())
-    rule = "no particles overlap" if contact_angle is None else f"no surfaces are within {bond_gap:g} mean radii"
-    remedy = "touching particles conduct with --contact-angle" if contact_angle is None else "see --bond-gap"
+    rule = f"no surfaces are within {bond_gap:g} mean radii" if bonded else "no particles overlap"
+    remedy = "see --bond-gap" if bonded else "touching particles conduct with --contact-angle"
     click.echo(
         f"etc-engine: warning: {rule}, so nothing conducts; the closest pair is {max(closest, 0.0):.2g} mean radii "
         f"apart: {remedy}",

@@ -30,7 +30,7 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
 
     Under mpirun every rank computes; the result has the same bits for any number of ranks. Finished units
     are kept beside the output until it is complete. Exit status: 0 done, 2 refused, 4 done with failed
-    realizations, 75 stopped early, to be gone on with by --resume.
+    realizations, 75 stopped early, to be continued by --resume.
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")
@@ -45,7 +45,7 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
 
 
 def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = None, dry_run: bool = False) -> int:
-    """Run a sweep on the ranks that were started; answers the exit status. ``realize`` may be a stand-in."""
+    """Run a sweep on the ranks that were started; returns the exit status. ``realize`` may be a stand-in."""
     from etc_engine import realization
     from etc_engine.sweep.scheduler import connect
 
@@ -57,7 +57,7 @@ def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = 
     except EtcError:
         if communicator.rank == 0:
             raise
-        return 2  # every rank has the same error, one tells it
+        return 2  # every rank has the same error, one reports it
     except BaseException as error:
         if communicator.size == 1:
             raise
@@ -94,7 +94,7 @@ def _tell(outcome: Outcome, seconds: float, ranks: int) -> None:
     if outcome.stopped:
         click.echo(
             f"etc-engine: stopped early ({outcome.stopped}): {outcome.computed} units finished by this run "
-            "are kept, go on with --resume",
+            "are kept, continue with --resume",
             err=True,
         )
         return
@@ -122,7 +122,7 @@ def _commonest_message(output: Path, *, failed: bool) -> str:
     from collections import Counter
 
     from etc_engine.realization import Status
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     dataset = open_dataset(output)
     status = dataset["status"].values.ravel()
@@ -155,8 +155,10 @@ def _foretell(study: Path, output: Path, communicator: Communicator, realize: Re
     click.echo(f"time      about {found.seconds(left):.3g} s on {found.ranks} rank{'s' * (found.ranks > 1)}")
     if found.most_units > found.units:
         click.echo(f"          at most about {found.seconds(found.most_units - found.finished):.3g} s")
-    click.echo(f"memory    {found.rank_bytes / 1e6:.0f} MB a rank")
+    click.echo(f"memory    {found.rank_bytes / 1e6:.0f} MB per rank")
     click.echo(f"disk      {found.shard_bytes / 1e6:.2g} MB of shards, {found.dataset_bytes / 1e6:.2g} MB of result")
+    for packing in found.packings:
+        click.echo(f"packing   {packing}")
     for remark in found.remarks:
         click.echo(f"probe     {remark}")
     return 0

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import xarray
 
     from etc_engine.study.transient import NetworkStudy
+    from etc_engine.transient.run import Transient
 
 EXIT_RESUMABLE = 75
 
@@ -45,7 +46,7 @@ def transient_command(
     """Run the transient STUDY (a TOML file with schema and kind) and write the fields to a netCDF file."""
     content, text = read_study(study)
     if overwrite and resume:
-        raise InputError("--resume goes on with what is there and --overwrite replaces it: choose one")
+        raise InputError("--resume continues with what is there and --overwrite replaces it: choose one")
     if output.exists() and not (overwrite or resume):
         raise OutputError(f"{output} exists: choose another name or give --overwrite")
     if not output.parent.is_dir():
@@ -90,17 +91,18 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
                 study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report
             )
     except InputError:
-        # what was refused leaves nothing behind, unless there is more than the start to go on from
+        # a refused study leaves nothing behind, unless there is more than the start to continue from
         if not wanted.resume and not state_path(states, 1).exists():
             remove_states(wanted.output)
         raise
     if done.stopped:
         click.echo(
             f"etc-engine: stopped early ({done.stopped}): {len(done.states)} of {done.times.size} states are "
-            f"kept, go on with --resume",
+            f"kept, continue with --resume",
             err=True,
         )
         return EXIT_RESUMABLE
+    _warn_of_digits(study, done)
     series = series_dataset(done, wanted.text)
     _draw(series, wanted)
     with replacing(wanted.output) as file:
@@ -114,6 +116,20 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
         err=True,
     )
     return 0
+
+
+def _warn_of_digits(study: NetworkStudy, done: Transient) -> None:
+    """What the reader decided, and contacts that the printed digits of the first or the last frame do not decide."""
+    from etc_engine.cli.particle_options import warn
+    from etc_engine.medium.rules import find_rule
+    from etc_engine.medium.sample_warnings import digit_warnings
+
+    for note in done.tables[0].notes if done.tables else ():
+        click.echo(f"etc-engine: note: {note}", err=True)
+    values = study.contacts.values()
+    bonded = "bond_gap" in find_rule(study.contacts.rule).keys
+    for table in dict.fromkeys((done.tables[0], done.tables[-1]) if done.tables else ()):
+        warn(digit_warnings(table, values.get("bond_gap", 0.0) if bonded else 0.0, bonded=bonded))
 
 
 def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
@@ -142,7 +158,7 @@ def _finish(study: NetworkStudy, wanted: Wanted) -> int:
     import json
 
     from etc_engine.sweep.claim import refuse_other_study
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     series = open_dataset(wanted.output)
     found = json.loads(series.attrs.get("study_resolved", "{}"))

@@ -24,18 +24,20 @@ def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     Returns
     -------
     dict of DataArray
-        ``diameter`` [m]: of the sphere (disk) of the mean volume (area). ``coordination``: mean over realizations.
-        ``temperature`` [K], ``emissivity`` and ``jump_length`` [m] of one surface where the study says them; an
-        emissivity of 0 beside a gas without radiation.
+        ``diameter`` [m]: of the sphere (disk) of the mean volume (area), of packings in files that of the first.
+        ``coordination``: mean over realizations. ``temperature`` [K], ``emissivity`` and ``jump_length`` [m] of one
+        surface where the study says them; an emissivity of 0 beside a gas without radiation.
     """
     import xarray
 
     study = current_study(dataset)
     found: dict[str, xarray.DataArray] = {}
-    size, dimension = np.prod(study["packing"]["box"]), dataset.sizes["direction_i"]
+    dimension = dataset.sizes["direction_i"]
     particles = dataset["particles"].where(dataset["particles"] > 0)
-    mean_size = (dataset["packing_density"] * float(size) / particles).mean("realization")
-    found["diameter"] = 2.0 * (mean_size / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension)
+    volumes = dataset["packing_density"] * float(np.prod(study["packing"]["box"])) / particles
+    files = "sources" in study["packing"]  # of these the box of the first is known
+    volume = volumes.isel(realization=0, drop=True) if files else volumes.mean("realization")
+    found["diameter"] = 2.0 * (volume / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension)
     found["coordination"] = 2.0 * (dataset["contacts"] / particles).mean("realization")
     for name in ("temperature", "emissivity"):
         if name in dataset.coords:
@@ -67,6 +69,6 @@ def _jump_length(study: dict[str, Any], dataset: xarray.Dataset) -> xarray.DataA
             value = float(a.values[place])
             mass = None if material is None else find_solid(material).atomic_mass
             if np.isnan(value):
-                value = 1.0 if mass is None else min(accommodation_from_masses(mass, state), 1.0)
-            values[place] = jump_length(state, value)
+                value = np.nan if mass is None else min(accommodation_from_masses(mass, state), 1.0)
+            values[place] = 0.0 if np.isnan(value) else jump_length(state, value)
     return t.copy(data=values)

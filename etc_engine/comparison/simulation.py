@@ -11,7 +11,7 @@ import numpy as np
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
 from etc_engine.study.files import SCHEMA
-from etc_engine.sweep.statistics import student_t
+from etc_engine.sweep.statistics import interval, student_t
 
 if TYPE_CHECKING:
     import xarray
@@ -91,6 +91,11 @@ def phases(dataset: xarray.Dataset) -> Phases:
         If the dataset is not the result of a sweep, or its particles are of two materials.
     """
     study = current_study(dataset)
+    if "particle_conductivity" not in dataset.coords:
+        raise InputError(
+            "models of two phases need particles of one material, those of this sweep have conductivities of their own "
+            "(by type, or a column of their files)"
+        )
     pores, particles = dataset["pore_conductivity"], dataset["particle_conductivity"]
     if "mixture_conductivity" in dataset.coords:
         other = dataset["mixture_conductivity"]
@@ -104,6 +109,10 @@ def phases(dataset: xarray.Dataset) -> Phases:
     return Phases(pores, particles, dataset.sizes["direction_i"], bind)
 
 
+MANY = 6
+"""More values than this are told by their lowest and highest."""
+
+
 def in_words(values: Any) -> str:
     """One number, or several, for readers.
 
@@ -111,8 +120,13 @@ def in_words(values: Any) -> str:
     --------
     >>> in_words(2.0), in_words(np.array([1.0, 5.0]))
     ('2', '1, 5')
+    >>> in_words(np.linspace(0.25, 0.5, 20))
+    '0.25 to 0.5'
     """
-    return ", ".join(f"{value:g}" for value in np.ravel(values))
+    several = np.ravel(values)
+    if several.size > MANY:
+        return f"{several.min():g} to {several.max():g}"
+    return ", ".join(f"{value:g}" for value in several)
 
 
 def mean_diagonal(tensor: xarray.DataArray) -> xarray.DataArray:
@@ -133,7 +147,7 @@ def mean_diagonal(tensor: xarray.DataArray) -> xarray.DataArray:
 
 
 def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
-    r"""Isotropic conductivity of every cell, with the Student-t interval of its mean.
+    r"""Isotropic conductivity of every cell, with the interval of its mean.
 
     .. math:: \bar k \pm t_{n-1,(1+c)/2}\, s/\sqrt n, \qquad k = \tfrac{1}{d} \operatorname{tr} \mathbf{k}
 
@@ -152,7 +166,8 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     -----
     The ensembles are isotropic up to the walls' order, so the mean of the diagonal is the estimate of their
     one conductivity, with less scatter than a component; s is its spread over realizations, not that of a
-    component. Realizations without a conductivity stay out; those that do not percolate count as 0.
+    component. Realizations without a conductivity stay out; those that do not percolate count as 0. Where there are
+    any, the interval is that of `etc_engine.sweep.statistics.interval` and not symmetric; ``half_width`` is half of it.
     """
     valid = dataset["status"] <= int(Status.NOT_PERCOLATING)
     samples = mean_diagonal(dataset["conductivity"]).where(valid)
@@ -163,19 +178,44 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     quantiles = np.array([student_t(confidence, int(n)) if n >= 2 else np.nan for n in count.values.ravel()])
     half_width = sem * count.copy(data=quantiles.reshape(count.shape))
     mean = mean_diagonal(dataset["conductivity_mean"])
+    low, high, fraction = _with_zeros(samples, mean - half_width, mean + half_width, confidence)
     result = mean.to_dataset(name="conductivity_mean")
     result["conductivity_sem"] = sem
-    result["half_width"] = half_width
-    result["conductivity_ci_low"] = mean - half_width
-    result["conductivity_ci_high"] = mean + half_width
+    result["half_width"] = 0.5 * (high - low)
+    result["conductivity_ci_low"] = low
+    result["conductivity_ci_high"] = high
+    result["percolating_fraction"] = fraction
     result["count"] = count
     result["solid_fraction"] = dataset["solid_fraction"].mean("realization")
     for name, meaning in _MEANINGS.items():
         result[name].attrs = {"long_name": meaning, "units": "W m-1 K-1"}
     for name in ("conductivity_ci_low", "conductivity_ci_high", "half_width"):
         result[name].attrs["confidence_level"] = confidence
+    result["percolating_fraction"].attrs = {"long_name": "fraction of the realizations that percolate", "units": "1"}
     result["solid_fraction"].attrs = dict(dataset["solid_fraction"].attrs)
     return result
+
+
+def _with_zeros(
+    samples: xarray.DataArray, low: xarray.DataArray, high: xarray.DataArray, confidence: float
+) -> tuple[xarray.DataArray, xarray.DataArray, xarray.DataArray]:
+    """Bounds of the mean and percolating fraction; bounds are replaced where a realization has the conductivity 0."""
+    low, high, fraction = low.copy(), high.copy(), _undefined(low)
+    swept = samples.transpose(*low.dims, "realization").values
+    for place in np.ndindex(*low.shape):
+        values = swept[place][np.isfinite(swept[place])]
+        if not values.size:
+            continue
+        found = interval(np.maximum(values, 0.0), confidence)
+        fraction.values[place] = found.percolating_fraction
+        if found.percolating_fraction < 1.0:
+            low.values[place], high.values[place] = found.low, found.high
+    return low, high, fraction
+
+
+def _undefined(values: xarray.DataArray) -> xarray.DataArray:
+    """An array of NaN on the dimensions of another."""
+    return values.copy(data=np.full(values.shape, np.nan))
 
 
 _MEANINGS = {

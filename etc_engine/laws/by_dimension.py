@@ -47,6 +47,8 @@ class ResistanceLaw:
         m, the weight of the first harmonic in kappa R^(d-2) H.
     share : float
         Part of the first harmonic that follows the stored dipole.
+    widest_cut : float
+        Half-angle [rad] up to which a wall may cut the particle with other contacts beside it.
     """
 
     name: str
@@ -62,6 +64,7 @@ class ResistanceLaw:
     warming: float
     harmonic: float
     share: float
+    widest_cut: float
 
 
 LAWS: Mapping[int, ResistanceLaw] = {
@@ -76,6 +79,7 @@ LAWS: Mapping[int, ResistanceLaw] = {
         warming=(0.125 - np.log(2.0)) / np.pi,
         harmonic=1.0 / np.pi,
         share=6.0 / 7.0,
+        widest_cut=0.5 * np.pi,
     ),
     3: ResistanceLaw(
         "sphere",
@@ -88,6 +92,7 @@ LAWS: Mapping[int, ResistanceLaw] = {
         warming=1.0 / (20.0 * np.pi),
         harmonic=3.0 / (4.0 * np.pi),
         share=7.0 / 8.0,
+        widest_cut=np.radians(75.0),
     ),
 }
 

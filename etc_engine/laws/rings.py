@@ -35,6 +35,8 @@ MODES = RINGS + 2
 """Most flux modes: contact disk at equilibrium, cap, rings."""
 WIDEST_CONTACT = np.sin(np.radians(85.0))
 """Largest contact radius, in radii of the smaller sphere."""
+LONE_DISK = np.radians(60.0)
+"""Beyond this half-angle a contact disk carries all the heat of its facet."""
 
 # Gauss points per ring, in the logarithm of the gap.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -182,7 +184,7 @@ def _check(rows: NDArray[np.float64]) -> None:
 def ring_edges(row: NDArray[np.float64], edges: NDArray[np.float64]) -> int:
     """Radii of the rings' edges; returns how many rings lie beyond the innermost cap.
 
-    Spaced by the angle on the smaller sphere: geometrically from the boundary layer outwards, or cubically away from
+    Spaced by the angle on the smaller sphere: geometrically from the boundary layer outwards, or by a power away from
     the edge of a contact.
     """
     small = min(row[_R1], row[_R2])
@@ -191,10 +193,11 @@ def ring_edges(row: NDArray[np.float64], edges: NDArray[np.float64]) -> int:
     if contact > 0.0:
         edges[0] = contact
         first = np.arcsin(contact / small)
-        if widest <= first * (1.0 + 1e-6) or (row[_FLUID] == 0.0 and row[_RADIATION] == 0.0):
+        if widest <= 1.02 * first or first > LONE_DISK or (row[_FLUID] == 0.0 and row[_RADIATION] == 0.0):
             return 0
+        power = 1.0 + 2.0 * (widest - first) / widest  # rings thinner than 1 % of their cap are lost in round-off
         for k in range(1, RINGS + 1):
-            edges[k] = small * np.sin(first + (widest - first) * (k / RINGS) ** 3)
+            edges[k] = small * np.sin(first + (widest - first) * (k / RINGS) ** power)
         return RINGS
     first = 0.25 * widest
     if row[_FLUID] > 0.0:  # smooth in all of its arguments, as results shall be
@@ -344,8 +347,11 @@ def _condense(rows, disks, tables, resistances, shapes):  # type: ignore[no-unty
                 factor[disk + k, disk + k] += fluid[disk + k]
             if disk:
                 factor[:2, :2] += row[_BOND]
-            _solve_ones(factor, size, w)
-            w[:size] /= w[:size].sum()
+            if most == 0 and disk:
+                w[0], w[1] = 1.0, 0.0
+            else:
+                _solve_ones(factor, size, w)
+                w[:size] /= w[:size].sum()
             if stride == 1:
                 shapes[p, :size] = w[:size]
             gap = row[_BOND] * (w[0] + w[1]) ** 2 if disk else 0.0

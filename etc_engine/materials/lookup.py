@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 from etc_engine.errors import InputError
-from etc_engine.materials.solid import Solid
+from etc_engine.materials.solid import Solid, solid_from_table
 from etc_engine.materials.solids import SOLIDS
 
 CATALOGUE: Mapping[str, Solid] = MappingProxyType({solid.name: solid for solid in SOLIDS})
@@ -30,8 +31,10 @@ ALIASES: Mapping[str, str] = MappingProxyType(
 )
 
 
-def find_solid(name: str) -> Solid:
-    """Return the solid of that name; case, spaces, hyphens and underscores do not matter.
+def find_solid(name: str | Mapping[str, Any]) -> Solid:
+    """Return the solid of that name, or of the user's own table (see `etc_engine.materials.solid_from_table`).
+
+    In names case, spaces, hyphens and underscores do not matter.
 
     Raises
     ------
@@ -42,7 +45,11 @@ def find_solid(name: str) -> Solid:
     --------
     >>> find_solid("SS316").name, find_solid("ti-6al-4v").name
     ('stainless steel 316', 'Ti-6Al-4V')
+    >>> float(find_solid({"temperature": [300, 500], "conductivity": [2.0, 1.0]}).conductivity.at(400.0))
+    1.5
     """
+    if isinstance(name, Mapping):
+        return solid_from_table("the material", name)
     wanted = _plain(name)
     known = {_plain(key): key for key in CATALOGUE} | {_plain(key): value for key, value in ALIASES.items()}
     if wanted in known:

@@ -86,7 +86,9 @@ def find_backbone(
         touches[clusters[network.wall_particles[driven]], network.walls[driven] % 2] = True
         spanning = (touches[:, 0] & touches[:, 1])[:, None]
     spans = tuple(bool(column.any()) for column in spanning.T)
-    in_play = np.array([row.any() for row in spanning])[clusters]
+    in_play = np.zeros(n, dtype=np.bool_)
+    for column in spanning.T:
+        in_play |= column[clusters]
     kept = _prune(in_play, network.pairs[conducts], network.wall_particles[driven])
     contacts = conducts & kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
     wall_contacts = driven & kept[network.wall_particles]

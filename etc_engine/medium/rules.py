@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +122,44 @@ def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float
     return _bonded(find_neighbors(packing, bond_gap), half_angle, "bonded")
 
 
+def radius_contacts(packing: ParticlePacking, contact_radius: float, bond_gap: float = 1e-6) -> ContactNetwork:
+    """Bonded contacts of one radius c on particles of all sizes: sin alpha = c/R.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+    contact_radius : float [m]
+        Radius of every contact disk (of disks: half the width of the chord), below that of the smallest particle.
+    bond_gap : float
+        As in `bonded_contacts`.
+
+    Returns
+    -------
+    ContactNetwork
+
+    Raises
+    ------
+    InputError
+        If the radius or the gap is out of range.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> packing = ParticlePacking([[0.2, 0.5], [0.7, 0.5]], [0.2, 0.3], Box((1.0, 1.0)))
+    >>> radius_contacts(packing, 0.1).angles.round(4)
+    array([[0.5236, 0.3398]])
+    """
+    smallest = float(packing.radii.min())
+    if not 0.0 < contact_radius < smallest:
+        raise InputError(
+            f"the contact radius must be positive and below the smallest particle's radius {smallest:g} m, found "
+            f"{contact_radius:g} m"
+        )
+    network = bonded_contacts(packing, 0.1, bond_gap)
+    angles = np.arcsin(contact_radius / packing.radii)
+    return replace(network, angles=angles[network.pairs], wall_angles=angles[network.wall_particles], rule="radius")
+
+
 def coordination_contacts(packing: ParticlePacking, half_angle: float, coordination: float) -> ContactNetwork:
     """Bonded contacts of the closest pairs, as many as give a mean coordination number.
 
@@ -188,6 +226,7 @@ ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", *WALL)}
 RULES: Mapping[str, Rule] = {
     "overlap": Rule(overlap_contacts, {}),
     "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
+    "radius": Rule(radius_contacts, {"contact_radius": "contact_radius", "bond_gap": "bond_gap"}),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
     "hertz": Rule(
         hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}, (*ELASTIC, "simulated_modulus")

@@ -11,6 +11,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from etc_engine.comparison.sensitivity import sensitivities
 from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
 from etc_engine.study.quantities import SWEPT, heading_of, word_of
@@ -71,6 +74,7 @@ def report_page(
         ("conductivity", "Conductivity", _picture(pictures["comparison"], "mean conductivity and models")),
         ("statistics", "Statistics", _statistics(dataset, comparison)),
         ("models", "Models and bounds", _models(comparison) + _fits(fits)),
+        ("sensitivity", "Sensitivity", _sensitivity(comparison)),
         ("realizations", "Convergence with realizations", _convergence(comparison, pictures)),
         ("size", "Convergence with system size", _system_sizes(systems, pictures)),
         ("histograms", "Histograms", _picture(pictures["histograms"], "histograms of the conductivity")),
@@ -89,6 +93,11 @@ def report_page(
     )
 
 
+def _packing(packing: Mapping[str, Any]) -> str:
+    """What made the packings, or the files that hold them."""
+    return f"files {packing['files']}" if "files" in packing else f"{packing['method']}, {packing['radii']}"
+
+
 def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[str, Any]) -> str:
     status = dataset["status"].values
     failed = int(((status > Status.NOT_PERCOLATING) & (status < Status.NOT_RUN)).sum())
@@ -96,9 +105,10 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     bound = "broken" if comparison.attrs["bound_broken"] else "kept"
     box = " x ".join(f"{length:g}" for length in study["packing"]["box"])
     facts = {
-        "packing": f"{study['packing']['method']}, {study['packing']['radii']}",
+        "packing": _packing(study["packing"]),
         "box [m]": f"{box}, {study['packing']['periodic'] or 'not'} periodic",
         "contacts": study["contacts"].get("rule", "none: the whole cell is solved"),
+        **_conditions(study),
         "engine and method": f"{study['conduction']['engine']}, {_words(study['conduction']['method'])}",
         "particles of a realization": _number(float(particles.mean()), ".0f"),
         "realizations of a cell": _range(dataset["count"].values.ravel().tolist()),
@@ -108,6 +118,38 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     }
     items = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>" for key, value in facts.items())
     return f"<dl class='facts'>{items}</dl>"
+
+
+def _conditions(study: Mapping[str, Any]) -> dict[str, str]:
+    """Solid, gas and radiation, where the study has them by name."""
+    gas, emissivity = study["pores"].get("gas"), study["radiation"].get("emissivity")
+    material = study["particles"].get("material")
+    fractions = gas.items() if isinstance(gas, dict) else ()
+    found = {
+        "particles": material if isinstance(material, str) else "a table of the study" if material else "",
+        "pores": ", ".join(f"{share:g} {name}" for name, share in fractions) if fractions else gas or "",
+    }
+    numbers = {
+        "pressure [Pa]": study["pores"].get("pressure"),
+        "temperature [K]": study["conduction"].get("temperature"),
+        "emissivity": emissivity,
+    }
+    found |= {key: in_words(value) for key, value in numbers.items() if value is not None}
+    return {key: words for key, words in found.items() if words}
+
+
+def _sensitivity(comparison: xarray.Dataset) -> str:
+    """Slopes over every dimension with several values: range over all cells, and the mean."""
+    rows = []
+    for name, slope in sensitivities(comparison).items():
+        known = slope.values[np.isfinite(slope.values)]
+        if known.size:
+            numbers = (known.min(), known.mean(), known.max())
+            rows.append([heading_of(name, comparison[name].attrs), *(_number(float(v), "+.3f") for v in numbers)])
+    if not rows:
+        return "<p class='faint'>No quantity has several values.</p>"
+    text = "<p>d ln k/d ln x between neighbouring values of each quantity, over all cells.</p>"
+    return text + _table(["quantity", "lowest", "mean", "highest"], rows)
 
 
 def _statistics(dataset: xarray.Dataset, comparison: xarray.Dataset) -> str:

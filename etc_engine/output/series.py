@@ -76,33 +76,39 @@ def series_dataset(transient: Transient, text: str = "") -> xarray.Dataset:
         name: (dims, values, {"units": units, "long_name": meaning})
         for name, (dims, values, units, meaning) in data.items()
     }
-    study = transient.study
     return xarray.Dataset(
         variables,
         coords={
             "time": ("time", np.array([s.time for s in states]), {"units": "s", "long_name": "time", "axis": "T"}),
             "wall": ("wall", list(WALLS[: rates.shape[1] - 1]), {"long_name": "wall of the box"}),
+            **_ids(transient),
         },
-        attrs={
-            "Conventions": "CF-1.11",
-            "title": f"{study.name}: transient heat conduction through a contact network",
-            "source": f"etc_engine {engine_version()}, engine {study.conduction.engine}",
-            "history": f"{now()} {command_line()}",
-            "command": command_line(),
-            "commit": engine_commit(),
-            "versions": json.dumps(versions()),
-            "study": text,
-            "study_resolved": json.dumps(study.resolved()),
-            "study_digest": study.digest(),
-            "engine": study.conduction.engine,
-            "method": study.conduction.method,
-            "scheme": study.time.scheme,
-            "box": list(packing.box.lengths),
-            "periodic": packing.box.periodic_axes,
-            "contacts": transient.network.count,
-            "wall_contacts": int(transient.network.walls.size),
-        },
+        attrs=_attributes(transient, text),
     )
+
+
+def _attributes(transient: Transient, text: str) -> dict[str, Any]:
+    """Global attributes: where the series comes from."""
+    study, box = transient.study, transient.network.packing.box
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"{study.name}: transient heat conduction through a contact network",
+        "source": f"etc_engine {engine_version()}, engine {study.conduction.engine}",
+        "history": f"{now()} {command_line()}",
+        "command": command_line(),
+        "commit": engine_commit(),
+        "versions": json.dumps(versions()),
+        "study": text,
+        "study_resolved": json.dumps(study.resolved()),
+        "study_digest": study.digest(),
+        "engine": study.conduction.engine,
+        "method": study.conduction.method,
+        "scheme": study.time.scheme,
+        "box": list(box.lengths),
+        "periodic": box.periodic_axes,
+        "contacts": transient.network.count,
+        "wall_contacts": int(transient.network.walls.size),
+    }
 
 
 def _rates_and_means(transient: Transient) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -117,6 +123,14 @@ def _rates_and_means(transient: Transient) -> tuple[NDArray[np.float64], NDArray
             rates.append(system.heat.rates(state.time, state.temperatures))
             means.append(system.particle_temperatures(state.temperatures))
     return np.array(rates), np.array(means)
+
+
+def _ids(transient: Transient) -> dict[str, Any]:
+    """The ids of the particles as a coordinate, where their file has them."""
+    ids = transient.tables[0].ids if transient.tables else None
+    if ids is None or np.unique(ids).size != ids.size:
+        return {}
+    return {"particle": ("particle", ids, {"long_name": "id of the particle in its file"})}
 
 
 def _places(transient: Transient) -> tuple[Any, NDArray[np.float64], NDArray[np.float64]]:

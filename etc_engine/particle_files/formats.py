@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from etc_engine.box import Box
-from etc_engine.errors import InputError
+from etc_engine.errors import EtcError, InputError
 from etc_engine.particle_files.csv_files import csv_rows, write_csv
 from etc_engine.particle_files.dumps import count_frames as count_dump
 from etc_engine.particle_files.dumps import dump_rows, write_dump
@@ -175,7 +176,7 @@ def read_particles(
         chosen = replace(chosen, box=tuple((0.0, length) for length in box.lengths), periodic=box.periodic_axes)
     if frame is not None:
         chosen = replace(chosen, frame=frame)
-    with seekable_copy(path) as place:
+    with _named(path) as place:
         kind = format_to_read(place)
         if chosen.frame is not None and not kind.has_frames:
             raise InputError(f"{path} is a {kind.name}, which holds one packing: leave the frame out")
@@ -189,8 +190,21 @@ def read_rows(path: Path | str, sample: Sample | None = None) -> Rows:
     ------
     InputError
     """
-    with seekable_copy(path) as place:
+    with _named(path) as place:
         return format_to_read(place).rows(place, sample or Sample())
+
+
+@contextmanager
+def _named(path: Path | str) -> Iterator[Path]:
+    """A place to read a file from, any number of times; errors call it by its own name."""
+    with seekable_copy(path) as place:
+        try:
+            yield place
+        except EtcError as error:
+            if str(place) != str(path):
+                name = "standard input" if str(path) == "-" else str(path)
+                error.args = (str(error).replace(str(place), name), *error.args[1:])
+            raise
 
 
 def count_frames(path: Path | str) -> int:

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from etc_engine.box import AXES, Box, parse_periodic
 from etc_engine.errors import InputError
+from etc_engine.particle_files.digits import EXACT, SINGLE, Digits, PrintedColumn, PrintedColumns
 from etc_engine.particle_files.sample import Rows, Sample, make_table
 from etc_engine.particle_files.table import ParticleTable
 
@@ -116,7 +118,19 @@ def netcdf_rows(path: Path) -> Rows:
         conductivity=held["conductivity"].astype(np.float64) if "conductivity" in held else None,
         ids=None if ids is None else ids.astype(np.int64),
         types=held["type"].astype(np.str_) if "type" in held else None,
+        printed=_single([held[axis] for axis in AXES[: box.dimension]], held["radius"]),
     )
+
+
+def _single(places: list[NDArray[Any]], radius: NDArray[Any]) -> PrintedColumns | None:
+    """Steps of numbers in single precision, which only others write."""
+    columns = [
+        PrintedColumn(Digits(0, 0, SINGLE) if a.dtype == np.float32 else Digits(EXACT, EXACT))
+        for a in (*places, radius)
+    ]
+    if all(a.dtype != np.float32 for a in (*places, radius)):
+        return None
+    return PrintedColumns(tuple(columns[:-1]), columns[-1], "write the file in double precision")
 
 
 def _box(path: Path, attributes: Mapping[str, Any]) -> Box:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.errors import InputError
 from etc_engine.laws.roughness import Roughness
 from etc_engine.materials import find_solid
 from etc_engine.medium.conditions import Conditions, pores_at
@@ -15,19 +17,21 @@ from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import find_rule
 from etc_engine.packing import ParticlePacking
+from etc_engine.particle_files.table import ParticleTable
 from etc_engine.realization.specification import RealizationSpec
 
 Values = Mapping[str, float]
 
 
 def make_media(
-    packing: ParticlePacking, spec: RealizationSpec, rng: np.random.Generator, *, contacts: bool
+    table: ParticleTable, spec: RealizationSpec, rng: np.random.Generator, *, contacts: bool
 ) -> list[Medium]:
     """The media of a packing, in the order of `RealizationSpec.combinations`.
 
     Parameters
     ----------
-    packing : ParticlePacking
+    table : ParticleTable
+        The packing, and conductivities or types of its particles where a file gives them.
     spec : RealizationSpec
     rng : numpy.random.Generator
         It places the second material of a mixture: the same order of the particles for all media.
@@ -39,6 +43,7 @@ def make_media(
     ------
     InputError, GeometryError
     """
+    packing = table.packing
     mixed = "mixture_fraction" in {*spec.values, *spec.axes}
     order = rng.permutation(packing.count) if mixed else None
     found: dict[tuple[float, ...], ContactNetwork] = {}
@@ -46,7 +51,8 @@ def make_media(
     for values in spec.combinations():
         network = _network(packing, spec.rule, values, found) if contacts else None
         solid = {} if spec.material is None else {"particle_conductivity": solid_conductivity(spec.material, values)}
-        conductivity = particle_conductivities(packing.count, {**values, **solid}, order)
+        own = own_conductivities(table, spec.types, values)
+        conductivity = particle_conductivities(packing.count, {**values, **solid}, order, own)
         pores = pores_at(conditions_of(spec, values), packing, values.get("pore_conductivity", 0.0))
         if network is not None and "roughness_height" in values:
             network = _roughened(network, values, conductivity, pores)
@@ -54,7 +60,7 @@ def make_media(
     return media
 
 
-def solid_conductivity(material: str, values: Values) -> float:
+def solid_conductivity(material: str | Mapping[str, Any], values: Values) -> float:
     """Conductivity of a solid by name at the temperature among the values [W/(m K)]."""
     return float(find_solid(material).conductivity.at(values["temperature"]))
 
@@ -118,9 +124,38 @@ def _network(
     return found[whole]
 
 
-def particle_conductivities(count: int, values: Values, order: NDArray[np.int64] | None) -> NDArray[np.float64]:
+def own_conductivities(
+    table: ParticleTable, types: Mapping[str, float | str] | None, values: Values
+) -> NDArray[np.float64] | None:
+    """Conductivity of each particle by its type, or by the column of its file; None where there is neither.
+
+    Raises
+    ------
+    InputError
+        If the particles have no types, or one of a type that is not named.
+    """
+    if types is None:
+        return table.conductivity
+    if table.types is None:
+        raise InputError("the particles have no column of types, by which their conductivities are given")
+    found = sorted(set(table.types.tolist()))
+    missing = [word for word in found if word not in types]
+    if missing:
+        raise InputError(
+            f"the particles have the types {', '.join(found)}: the conductivity of {missing[0]} is missing"
+        )
+    by_type = {
+        word: solid_conductivity(value, values) if isinstance(value, str) else float(value)
+        for word, value in types.items()
+    }
+    return np.array([by_type[word] for word in table.types.tolist()])
+
+
+def particle_conductivities(
+    count: int, values: Values, order: NDArray[np.int64] | None, own: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Conductivity of each particle, shape (count,) [W/(m K)]; a mixture has its second material at random places."""
-    conductivities = np.full(count, values["particle_conductivity"])
+    conductivities = np.full(count, values["particle_conductivity"]) if own is None else own.copy()
     if order is not None:
         conductivities[order[: round(values["mixture_fraction"] * count)]] = values["mixture_conductivity"]
     return conductivities

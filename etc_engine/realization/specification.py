@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from etc_engine.medium.conduction import Conduction
 from etc_engine.packing import PackingSpec
+from etc_engine.particle_files.collection import PackingSource
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,8 @@ class RealizationSpec:
 
     Parameters
     ----------
-    packing : PackingSpec
+    packing : PackingSpec or PackingSource
+        What makes the packing, or the file that holds it.
     rule : str
         Contact rule, a word of `etc_engine.medium.rules.RULES`.
     conduction : tuple of Conduction
@@ -25,19 +28,22 @@ class RealizationSpec:
         Physical values in SI units (angles in radians), by the names of `etc_engine.study.quantities.QUANTITIES`.
     axes : mapping of str to tuple of float
         Those of which there are several; each combination is a medium, the last axis running fastest.
-    material : str, optional
-        Solid of the particles by name: its conductivity at ``temperature`` takes the place of a number.
+    material : str or mapping, optional
+        Solid of the particles by name, or as a table: its conductivity at ``temperature`` takes the place of a number.
     gas : str or mapping, optional
         What fills the pores, by name or mole fractions, see `etc_engine.materials.gas_state`.
+    types : mapping of str to float or str, optional
+        Of packings in files: conductivity [W/(m K)] or material by type of particle.
     """
 
-    packing: PackingSpec
+    packing: PackingSpec | PackingSource
     rule: str = "overlap"
     conduction: tuple[Conduction, ...] = (Conduction(),)
     values: Mapping[str, float] = field(default_factory=dict)
     axes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    material: str | None = None
+    material: str | Mapping[str, Any] | None = None
     gas: str | Mapping[str, float] | None = None
+    types: Mapping[str, float | str] | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:

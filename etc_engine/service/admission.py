@@ -117,7 +117,7 @@ def _refuse_excess(found: Application, limits: Limits) -> None:
     if not memory <= allowed:
         field = "packing.box" if ENGINES[found.study.conduction.engine].needs_contacts else "conduction"
         raise StudyError(
-            f"{SOURCE}: {field}: takes about {memory:.0f} MB of memory a rank, this service allows {allowed:.0f} MB"
+            f"{SOURCE}: {field}: takes about {memory:.0f} MB of memory per rank, this service allows {allowed:.0f} MB"
         )
 
 

@@ -171,7 +171,7 @@ async def submit_study(request: Request, response: Response) -> Submitted:
 
 @api.post("/studies/check", openapi_extra=STUDY_BODY)
 async def check_study(request: Request) -> Estimate:
-    """Check a study and tell its size, without running it."""
+    """Check a study and report its size, without running it."""
     service = _service(request)
     found = await run_in_threadpool(apply, await _study_text(request), service.settings.limits)
     return Estimate(
@@ -208,7 +208,7 @@ def remove_study(request: Request, study: Id) -> None:
 
 @api.post("/studies/{study}/cancel")
 def cancel_study(request: Request, study: Id) -> StudySummary:
-    """End a study that waits or runs; what is finished is kept, and resume goes on with it."""
+    """End a study that waits or runs; what is finished is kept, and resume continues with it."""
     service = _service(request)
     entry = _entry(request, study)
     if not service.queue.cancel(study):
@@ -219,7 +219,7 @@ def cancel_study(request: Request, study: Id) -> StudySummary:
 
 @api.post("/studies/{study}/resume")
 def resume_study(request: Request, study: Id) -> StudySummary:
-    """Put a cancelled or failed study back in the queue; it goes on where it stopped."""
+    """Put a cancelled or failed study back in the queue; it continues where it stopped."""
     service = _service(request)
     entry = _entry(request, study)
     if not service.queue.resume(study):
@@ -342,7 +342,7 @@ def _finished(request: Request, study: str) -> str:
 def _submit(service: Service, text: str) -> tuple[Entry, bool]:
     """Check a study, keep its text, put it in the queue: so the queue never names what is not there.
 
-    One that was cancelled or has failed goes on.
+    One that was cancelled or has failed continues.
     """
     found = apply(text, service.settings.limits)
     with service.changing:

@@ -1,4 +1,4 @@
-"""The client: a few functions that speak to the service and answer datasets; the standard library is all they need.
+"""The client: a few functions that speak to the service and return datasets; the standard library is all they need.
 
 ::
 
@@ -105,7 +105,7 @@ def wait(
             found = status(server, study)
         except OutputError as error:
             if time.monotonic() - answered > patience:
-                again = f"the study goes on; ask again with: etc-engine fetch {study} -o result.nc"
+                again = f"the study continues; ask again with: etc-engine fetch {study} -o result.nc"
                 raise OutputError(f"{error} No answer for {patience:g} s; {again}") from None
         else:
             answered = time.monotonic()
@@ -141,7 +141,7 @@ def fetch(server: Server, study: str, output: Path | None = None) -> xarray.Data
     OutputError
         If the file cannot be written.
     """
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     if output is not None:
         download(server, study, output)

@@ -21,7 +21,7 @@ from etc_engine.service.store import Store
 
 SLURM = ("sbatch", "squeue", "scancel")
 RANKS_PER_CORE = 16
-"""Ranks more than that are a slip of the pen: one a core is what is fast."""
+"""More ranks than this are a mistake: one per core is fastest."""
 HELD = 'ulimit -d "$1" 2>/dev/null; shift; exec "$@"'
 """Holds the memory of what follows (in kilobytes) and becomes it."""
 
@@ -46,7 +46,7 @@ class Launcher(Protocol):
         """Seconds between two looks at a batch."""
 
     def start(self, study: str) -> str:
-        """Start the batch of a study; answers how it is found again."""
+        """Start the batch of a study; returns how it is found again."""
 
     def find(self, study: str) -> str:
         """A batch that was started by a service which could not note it any more; empty if there is none."""
@@ -101,7 +101,7 @@ class LocalLauncher:
         return ""
 
     def look(self, study: str, batch: str) -> Ended | None:
-        """A child tells its exit status; a batch that an earlier service started only that it has ended."""
+        """Of a child the exit status is known; of a batch of an earlier service only that it has ended."""
         child = self._children.get(study)
         if child is not None:
             status = child.poll()
@@ -142,7 +142,7 @@ class SlurmLauncher:
         return self.settings.squeue_seconds
 
     def start(self, study: str) -> str:
-        """Write the script beside the study and submit it; answers the number of the job."""
+        """Write the script beside the study and submit it; returns the number of the job."""
         folder = self.store.folder(study)
         shutil.copyfile(slurm_script(), folder / "slurm.sh")
         options = [f"--ntasks={self.settings.ranks}", f"--job-name={_job_name(study)}", f"--chdir={folder}"]

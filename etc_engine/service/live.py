@@ -14,7 +14,8 @@ from etc_engine.realization import Status
 from etc_engine.service.curve import curve_of
 from etc_engine.service.store import Store
 from etc_engine.study.sweep import Study, read_study
-from etc_engine.sweep.dataset import assemble, open_dataset
+from etc_engine.sweep.dataset import assemble
+from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.shards import SUFFIX, ShardReader
 from etc_engine.sweep.table import Table, join, tabulate
 

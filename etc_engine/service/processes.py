@@ -53,7 +53,7 @@ def batch_processes(result: Path) -> Iterator[int]:
 
 
 def kill_batch(result: Path) -> int:
-    """Kill what still computes a result, and wait until it is gone; answers how many there were."""
+    """Kill what still computes a result, and wait until it is gone; returns how many there were."""
     found = {ProcessIdentity.of(number) for number in batch_processes(result)}
     for process in found:
         process.signal(signal.SIGKILL)

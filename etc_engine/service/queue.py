@@ -42,7 +42,7 @@ class Entry:
     """A study in the queue.
 
     ``done`` of ``planned`` units are finished; an adaptive study grows to ``most`` at most. ``attempts`` counts starts
-    of its batch without a finished unit since the last one; ``batch`` tells the running batch to its launcher.
+    of its batch without a finished unit since the last one; ``batch`` names the running batch to its launcher.
     """
 
     number: int
@@ -106,7 +106,7 @@ class Queue:
             self._base.close()
 
     def submit(self, study: str, name: str, planned: int, most: int) -> tuple[Entry, bool]:
-        """Put a study in the queue, unless it is there; answers its entry and whether it is new.
+        """Put a study in the queue, unless it is there; returns its entry and whether it is new.
 
         Raises
         ------
@@ -194,11 +194,11 @@ class Queue:
         )
 
     def put_back(self, study: str, reason: str) -> None:
-        """The batch ended before its time: the study goes on in its old place."""
+        """The batch ended before its time: the study continues in its old place."""
         self._do("UPDATE studies SET state = 'queued', reason = ?, batch = '' WHERE id = ?", (reason, study))
 
     def cancel(self, study: str) -> bool:
-        """Ask for the end of a study; answers False if it is neither waiting nor running."""
+        """Ask for the end of a study; returns False if it is neither waiting nor running."""
         with self._guard:
             waiting = self._do(
                 "UPDATE studies SET state = 'cancelled', reason = 'cancelled', ended = ? "
@@ -210,7 +210,7 @@ class Queue:
             )
 
     def resume(self, study: str) -> bool:
-        """Put a cancelled or failed study at the end of the queue; answers False if it is neither."""
+        """Put a cancelled or failed study at the end of the queue; returns False if it is neither."""
         return bool(
             self._do(
                 "UPDATE studies SET state = 'queued', reason = '', ended = '', attempts = 0, place = ? "
@@ -220,7 +220,7 @@ class Queue:
         )
 
     def remove(self, study: str) -> bool:
-        """Forget a study that is not running; answers False if it is."""
+        """Forget a study that is not running; returns False if it is."""
         return bool(self._do("DELETE FROM studies WHERE id = ? AND state != 'running'", (study,)))
 
     def _ask(self, rest: str, values: tuple[Any, ...]) -> list[Entry]:
@@ -230,6 +230,6 @@ class Queue:
         return [Entry(**{**values, "cancelling": bool(values["cancelling"])}) for values in named]
 
     def _do(self, statement: str, values: tuple[Any, ...]) -> int:
-        """Change something; answers how many studies it concerned."""
+        """Change something; returns how many studies it concerned."""
         with self._guard:
             return self._base.execute(statement, values).rowcount

@@ -26,7 +26,7 @@ class Limits:
     particles : int
         Largest expected number of particles in a packing.
     memory_bytes : int
-        Memory of a rank, and of a single solve.
+        Memory per rank, and of a single solve.
     study_seconds, solve_seconds : float
         Longest time of a study's batch (one start of it) and of a single solve.
     waiting : int

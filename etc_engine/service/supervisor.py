@@ -73,7 +73,7 @@ class Supervisor:
         self._thread.start()
 
     def stop(self) -> None:
-        """End in order: batches on this machine are asked to end and go on with the next service."""
+        """End in order: batches on this machine are asked to end and continue with the next service."""
         self._stopping.set()
         self._wake.set()
         self._thread.join()
@@ -150,7 +150,7 @@ class Supervisor:
         if entry.cancelling:
             return "cancelled"
         if not self._launcher.outlives and moment - watch.began > self._limits.study_seconds:
-            return f"stopped at the time limit of this service, {self._limits.study_seconds:.6g} s; resume goes on"
+            return f"stopped at the time limit of this service, {self._limits.study_seconds:.6g} s; resume continues"
         return ""
 
     def _count(self, entry: Entry) -> None:
@@ -188,7 +188,7 @@ class Supervisor:
             self._queue.finish(entry.id, units, failed_cells)
 
     def _try_again(self, entry: Entry, reason: str) -> None:
-        """The study goes on at once after progress, a little later without, and fails after three such starts."""
+        """The study continues at once after progress, a little later without, and fails after three such starts."""
         if entry.attempts >= ATTEMPTS:
             self._queue.settle(entry.id, "failed", reason)
             return

@@ -33,7 +33,8 @@ def check_conditions(study: Study) -> None:
         raise ValueError(f"pores: {error}") from None
     if study.particles.material is not None and first["temperature"] is None:
         raise ValueError("conduction.temperature: missing, the conductivity of particles.material depends on it")
-    if first["temperature"] is not None and not (study.particles.material or study.pores.gas or glow):
+    named = study.particles.material or getattr(study.particles, "types", None)
+    if first["temperature"] is not None and not (named or study.pores.gas or glow):
         raise ValueError("conduction.temperature: has no meaning without a material, a gas or radiation, take it out")
     derived_conductivities(study)
 

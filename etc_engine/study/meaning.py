@@ -54,7 +54,7 @@ def chosen(study: StudyTable, place: str) -> tuple[str, ...]:
         return tuple(found.methods)
     for key in place.split("."):
         found = getattr(found, key)
-    return (NONE,) if found is None else (found if isinstance(found, str) else "a mixture",)
+    return (NONE,) if found is None else (found if isinstance(found, str) else "a table",)
 
 
 def meaningless(study: StudyTable) -> Iterator[tuple[str, str]]:

@@ -121,6 +121,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             comment="half of the angle that the contact subtends at the centre of a particle; not a wetting angle",
             si=float(np.pi / 180.0),
         ),
+        Quantity("contacts.contact_radius", "m", "contact radius", "contacts", Positive, POSITIVE),
         Quantity(
             "contacts.bond_gap",
             "1",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,8 +11,10 @@ from pydantic import Field, model_validator
 
 from etc_engine.box import Box, parse_periodic
 from etc_engine.engines.voxel.voxelization import check_memory, coarsest_resolution
-from etc_engine.errors import InputError
+from etc_engine.errors import InputError, StudyError
 from etc_engine.medium.rules import RULES
+from etc_engine.packing import PackingSpec
+from etc_engine.particle_files.collection import PackingSource
 from etc_engine.realization import ENGINES, Conduction, RealizationSpec
 from etc_engine.study.conditions import check_conditions
 from etc_engine.study.files import A_SEED, SCHEMA, Seed, StudyFile, parse_toml, read_text, validated
@@ -210,10 +213,9 @@ class Study(StudyFile):
     def realization_spec(self, density: float | None) -> RealizationSpec:
         """The specification of one realization at a density of this study (None: the packer's own)."""
         rows = QUANTITIES
-        growth = self.contacts.rule in ("overlap", "hertz") and ENGINES[self.conduction.engine].needs_contacts
         si = {name: tuple(value * rows[name].si for value in values) for name, values in self.quantities.items()}
         return RealizationSpec(
-            packing=self.packing.spec(density, radius_growth=growth),
+            packing=self._packing_spec(density),
             rule=self.contacts.rule,
             conduction=tuple(self._conduction(method) for method in self.methods),
             values={name: values[0] for name, values in si.items() if name not in self.axes},
@@ -221,6 +223,23 @@ class Study(StudyFile):
             material=self.particles.material,
             gas=self.pores.gas,
         )
+
+    def _packing_spec(self, density: float | None) -> PackingSpec | PackingSource:
+        """What makes the packing of a realization."""
+        growth = self.contacts.rule in ("overlap", "hertz") and ENGINES[self.conduction.engine].needs_contacts
+        return self.packing.spec(density, radius_growth=growth)
+
+    def for_realization(self, spec: RealizationSpec, realization: int) -> RealizationSpec:  # noqa: ARG002
+        """The specification of one of the realizations; packings that are made differ in their random stream alone."""
+        return spec
+
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should know before the sweep runs."""
+        return ()
+
+    def realization_coordinates(self) -> dict[str, tuple[list[Any], str]]:
+        """Coordinates along the realizations, with their meaning."""
+        return {}
 
     def _conduction(self, method: str) -> Conduction:
         """How one of the methods conducts, with the options that it heeds."""
@@ -239,7 +258,8 @@ def read_study(path: Path) -> tuple[Study, str]:
         one line that names the file, the key, what was found and what is allowed.
     """
     text = read_text(path)
-    return parse_study(text, str(path)), text
+    content = parse_toml(text, str(path))
+    return study_of(content, str(path), path.parent), text
 
 
 def parse_study(text: str, source: str = "study") -> Study:
@@ -251,7 +271,31 @@ def parse_study(text: str, source: str = "study") -> Study:
     Traceback (most recent call last):
     etc_engine.errors.StudyError: s.toml: name: missing, expected a name ... (and 3 more problems)
     """
-    return validated(parse_toml(text, source), Study, source)
+    return study_of(parse_toml(text, source), source)
+
+
+def study_of(content: Mapping[str, Any], source: str = "study", folder: Path | None = None) -> Study:
+    """The study of a file's content: one that makes its packings, or one that finds them in files.
+
+    Parameters
+    ----------
+    content : mapping
+    source : str
+        It names the file in errors.
+    folder : Path, optional
+        Of the study file; without one, files of packings must have been found before.
+
+    Raises
+    ------
+    StudyError
+    """
+    from etc_engine.study.file_packings import FileStudy, find_packings, reads_files
+
+    if not reads_files(content):
+        return validated(content, Study, source)
+    if folder is None and "sources" not in content["packing"]:
+        raise StudyError(f"{source}: packing.files: packings in files are read by the command sweep, beside the files")
+    return validated(find_packings(content, folder or Path(), source), FileStudy, source)
 
 
 def study_schema() -> dict[str, Any]:

@@ -37,9 +37,10 @@ def _known_rule(word: str) -> str:
     return word
 
 
-def _known_solid(word: str) -> str:
+def _known_solid(found: str | dict[str, Any]) -> str | dict[str, Any]:
     try:
-        return find_solid(word).name
+        solid = find_solid(found)
+        return solid.name if isinstance(found, str) else found
     except InputError as error:
         raise ValueError(str(error)) from None
 
@@ -57,7 +58,7 @@ def _field_of(option: Option) -> tuple[Any, Any]:
             raise ValueError(f"found {value!r}, allowed: {allowed}")
         return value
 
-    kind = {int: "integer", str: "string"}.get(type(option.default))
+    kind = {bool: "boolean", int: "integer", str: "string"}.get(type(option.default))
     schema = WithJsonSchema({"type": kind} if kind else {})
     return Annotated[Any, AfterValidator(checked), schema], Field(
         default=option.default, description=option.description
@@ -162,8 +163,12 @@ class MixtureTable(QuantityTable):
 class ParticlesTable(QuantityTable):
     """``[particles]``: what they are made of."""
 
-    material: Annotated[Word, AfterValidator(_known_solid)] | None = Field(
-        default=None, description="a solid by the name that the command `materials` prints"
+    material: (
+        Annotated[Word | dict[Word, Any], AfterValidator(_known_solid), WithJsonSchema({"type": "string"})] | None
+    ) = Field(
+        default=None,
+        description="a solid by the name that the command `materials` prints, or a table such as "
+        "{ temperature = [300, 900], conductivity = [2.0, 1.5] }",
     )
     mixture: MixtureTable | None = Field(
         default=None, description="a table such as { conductivity = 10.0, fraction = 0.3 }"

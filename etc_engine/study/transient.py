@@ -49,6 +49,11 @@ class FileTable(StudyTable):
         default=None, description="two or three positive edge lengths, of a CSV file"
     )
     periodic: Word | None = Field(default=None, description="a combination of the letters x, y, z, of a CSV file")
+    crop: tuple[str, ...] | None = Field(
+        default=None, description="ranges low:high of each axis to keep, '' for all, such as ['', '0:0.024']"
+    )
+    dimension: Literal[2, 3] | None = Field(default=None, description="2 or 3, where the file cannot say")
+    radius_column: Word | None = Field(default=None, description="the name of the column of radii")
 
 
 def _made_or_read(packing: object) -> str:
@@ -113,23 +118,39 @@ class Source(StudyTable):
     particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
         default=None, description="a list of whole numbers from 0, the rows of particles; all by default"
     )
+    ids: Annotated[list[Annotated[int, Field(strict=True)]], SOME] | None = Field(
+        default=None, description="a list of whole numbers, the ids of particles in their file"
+    )
+    types: Annotated[list[int | Word], SOME] | None = Field(
+        default=None, description="a list of types of particles, as their file names them"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Source:
+        given = [key for key in ("particles", "ids", "types") if getattr(self, key) is not None]
+        if len(given) > 1:
+            raise ValueError(f"{given[0]} and {given[1]} both choose particles, take one of them out")
+        return self
 
 
 class ParticlesTable(StudyTable):
     """``[particles]``: what they are made of, and how warm they are at first; a number, or one for each particle."""
 
     conductivity: Positive = Field(default=1.0, description=f"{POSITIVE} [W/(m K)]")
+    types: dict[str, Positive] | None = Field(
+        default=None, description="a table such as { 1 = 2.4, 2 = 1.1 }: conductivity by type of the file [W/(m K)]"
+    )
     heat_capacity: Annotated[
         Annotated[Positive, Tag(AS_NUMBER)] | Annotated[list[Positive], SOME, Tag(AS_LIST)], WRITTEN
     ] = Field(description=f"{POSITIVE}, or a list of such, one for each particle: rho c [J/(m3 K)]")
     initial: Annotated[
-        Annotated[Number, Tag(AS_NUMBER)]
+        Annotated[Number | Literal["file"], Tag(AS_NUMBER)]
         | Annotated[list[Number], SOME, Tag(AS_LIST)]
         | Annotated[Gradient, Tag(AS_TABLE)],
         WRITTEN,
     ] = Field(
-        description=f"{NUMBER} [K], a list of such, one for each particle, or a table such as "
-        "{ value = 0.0, gradient = [1.0, 0.0] }"
+        description=f"{NUMBER} [K], a list of such, one for each particle, a table such as "
+        "{ value = 0.0, gradient = [1.0, 0.0] }, or 'file': the temperatures of the particle file"
     )
 
 
@@ -162,7 +183,7 @@ class Time(StudyTable):
 
 
 def refuse_endless(time: Time, times: Sequence[float] | NDArray[np.float64]) -> None:
-    """Refuse steps that no run lives to see.
+    """Refuse more steps than a run can take.
 
     Raises
     ------
@@ -227,6 +248,8 @@ class NetworkStudy(StudyFile):
         file = self.packing
         if not isinstance(file, FileTable) or "frames" in file.model_fields_set or file.box is not None:
             raise ValueError("motion: it takes all frames of a dump, the file of packing.files, and the dump's own box")
+        if file.crop is not None:
+            raise ValueError("packing.crop: particles would come and go with [motion], take it out")
         if self.time.times:
             raise ValueError("time.times: with [motion] the output times are those of the frames, take them out")
         if self.time.scheme != "adaptive" and self.time.steps is None:

@@ -72,7 +72,9 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
     shards = sorted(folder.glob(f"*{SUFFIX}"))
     if policy == "fresh" and (shards or output.exists()):
         what = f"finished units of {output}" if shards else f"{output}"
-        raise OutputError(f"{what} exist{'' if shards else 's'}: go on with --resume, or start anew with --overwrite")
+        raise OutputError(
+            f"{what} exist{'' if shards else 's'}: continue with --resume, or start anew with --overwrite"
+        )
     if policy == "resume" and not shards and output.exists():
         refuse_other_study(study, *_study_of_output(output), str(output))
         return Claim(study, text, output, run, complete=True)
@@ -88,7 +90,7 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
         write_study_file(folder, study.identity(), study.digest())
     record = json.dumps(asdict(this_run(run, ranks, lock.holder.job)))
     write_atomically(folder / f"{run}.run", record.encode())
-    return Claim(study, text, output, run, remarks=remarks)
+    return Claim(study, text, output, run, remarks=(*remarks, *study.remarks()))
 
 
 def new_run() -> str:
@@ -111,6 +113,10 @@ def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str 
     """
     for key in sorted({*found, *wanted}, key=lambda key: (key != "schema", key)):
         there, here = found.get(key), wanted.get(key)
+        if (
+            there is not None and here is not None and _alike(there, here)
+        ):  # lists of tables, such as the files of a study
+            there, here = ({f"{k}": item for k, item in enumerate(items)} for items in (there, here))
         if isinstance(there, Mapping) and isinstance(here, Mapping):
             inner = difference(there, here, f"{prefix}{key}.")
             if inner:
@@ -118,6 +124,12 @@ def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str 
         elif there != here:
             return f"{prefix}{key} is {there!r} there and {here!r} here"
     return ""
+
+
+def _alike(there: Any, here: Any) -> bool:
+    """Whether both are lists of tables of one length."""
+    lists = isinstance(there, (list, tuple)) and isinstance(here, (list, tuple)) and len(there) == len(here)
+    return lists and all(isinstance(item, Mapping) for item in (*there, *here))
 
 
 def _make_folder(output: Path) -> Path:
@@ -141,7 +153,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _study_of_output(output: Path) -> tuple[str, dict[str, Any]]:
-    from etc_engine.sweep.dataset import open_dataset
+    from etc_engine.sweep.result_file import open_dataset
 
     attributes = open_dataset(output).attrs
     return attributes["study_digest"], json.loads(attributes["study_resolved"])
@@ -178,6 +190,8 @@ def refuse_other_study(study: Identified, digest: str, identity: Mapping[str, An
         return
     wanted = study.identity()
     found = {key: value for key, value in identity.items() if key in wanted}
+    if isinstance(found.get("packing"), Mapping):  # where files are is no part of what they hold
+        found["packing"] = {key: value for key, value in found["packing"].items() if key != "folder"}
     raise StudyError(
         f"{place} belongs to another study ({difference(found, wanted)}): "
         "resume with that study, or start anew with --overwrite"

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.durable.files import replacing
-from etc_engine.errors import OutputError
 from etc_engine.realization import Status
 from etc_engine.study.conditions import derived_conductivities
 from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.sweep import Study
-from etc_engine.sweep.statistics import summarize
+from etc_engine.sweep.statistics import interval, summarize
 from etc_engine.sweep.table import CELL_VARIABLES, MEASURES, UNIT_VARIABLES, Table
 
 if TYPE_CHECKING:
@@ -35,6 +32,20 @@ STATISTICS = {
     "ci_low": "lower end of the confidence interval of the mean conductivity",
     "ci_high": "upper end of the confidence interval of the mean conductivity",
 }
+PERCOLATION = {
+    "percolating_fraction": ("percolating_fraction", "fraction of the realizations that percolate"),
+    "percolating_fraction_ci_low": ("fraction_low", "lower end of the interval of the percolating fraction"),
+    "percolating_fraction_ci_high": ("fraction_high", "upper end of the interval of the percolating fraction"),
+    "conductivity_mean_percolating": ("percolating_mean", "mean conductivity of the realizations that percolate"),
+    "conductivity_mean_percolating_ci_low": ("percolating_low", "lower end of the interval of that conductivity"),
+    "conductivity_mean_percolating_ci_high": ("percolating_high", "upper end of the interval of that conductivity"),
+}
+"""Variable of a direction -> field of `etc_engine.sweep.statistics.Interval`, meaning."""
+
+INTERVAL_COMMENT = (
+    "of a diagonal component: Student t, given that all percolate, where all realizations do; where some do not, "
+    "the intervals of their fraction and of the mean of the others combined. Off the diagonal: Student t"
+)
 DERIVED = "of the material, or of the gas as a continuum, at the temperature and pressure"
 STREAM_COMMENT = (
     "the stream is PCG64(SeedSequence(seed, spawn_key=(high, low, realization))) with the two 32-bit halves "
@@ -69,7 +80,7 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     dataset = xarray.Dataset(attrs=dict(attributes))
     dataset = dataset.assign_coords(_coordinates(study, units["packing_density"]))
     dataset["conductivity"] = (cell + TENSOR, cells["conductivity"], _conductivity_attributes("conductivity"))
-    if "exact" in study.methods:
+    if "exact" in study.methods or study.conduction.bounds:
         meaning = _conductivity_attributes("lower and upper bound of the conductivity along a direction")
         dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
@@ -101,6 +112,9 @@ def _coordinates(study: Study, packing_density: NDArray[np.float64]) -> dict[str
         "direction_i": ("direction_i", axes, {"long_name": "direction of the flux"}),
         "direction_j": ("direction_j", axes, {"long_name": "direction of the gradient"}),
     }
+    for name, (held, meaning) in study.realization_coordinates().items():
+        kind = object if isinstance(held[0], str) else np.int64
+        found[name] = ("realization", np.array(held, dtype=kind), {"long_name": meaning})
     for name, values in study.quantities.items():
         several = name in study.axes
         attributes = QUANTITIES[name].attributes(study.box.dimension)
@@ -143,19 +157,33 @@ def _add_statistics(dataset: xarray.Dataset, swept: tuple[str, ...], cells: Valu
     shape, tensor = valid.shape[:-1], cells["conductivity"].shape[-2:]
     count = np.zeros(shape, np.int64)
     values = {name: np.full(shape + tensor, np.nan) for name in STATISTICS}
+    parts = {name: np.full(shape + tensor[:1], np.nan) for name in PERCOLATION}
     for place in np.ndindex(*shape):
-        summary = summarize(cells["conductivity"][place][valid[place]], confidence)
+        samples = cells["conductivity"][place][valid[place]]
+        summary = summarize(samples, confidence)
         count[place] = summary.count
         for name in STATISTICS:
             values[name][place] = getattr(summary, name)
+        for k in range(tensor[0]):
+            if not summary.count or not np.isfinite(samples[:, k, k]).all():
+                continue
+            found = interval(np.maximum(samples[:, k, k], 0.0), confidence)
+            for name, (field, _) in PERCOLATION.items():
+                parts[name][(*place, k)] = getattr(found, field)
+            if found.percolating_fraction < 1.0:
+                values["ci_low"][(*place, k, k)], values["ci_high"][(*place, k, k)] = found.low, found.high
     for name, long_name in STATISTICS.items():
         attributes = _conductivity_attributes(long_name)
         if name.startswith("ci"):
-            attributes |= {
-                "confidence_level": confidence,
-                "comment": "Student t with count - 1 degrees of freedom",
-            }
+            attributes |= {"confidence_level": confidence, "comment": INTERVAL_COMMENT}
         dataset[f"conductivity_{name}"] = (swept + TENSOR, values[name], attributes)
+    for name, (_, meaning) in PERCOLATION.items():
+        attributes = _conductivity_attributes(meaning)
+        if name.startswith("percolating"):
+            attributes["units"] = "1"
+        if "_ci_" in name:
+            attributes |= {"confidence_level": confidence}
+        dataset[name] = ((*swept, TENSOR[0]), parts[name], attributes)
     dataset["count"] = (
         swept,
         count,
@@ -178,21 +206,6 @@ def _status_attributes() -> dict[str, Any]:
     }
 
 
-def write_dataset(dataset: xarray.Dataset, output: Path) -> None:
-    """Write a dataset as netCDF-4, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written; nothing is left behind then.
-    """
-    try:
-        with replacing(output) as temporary:
-            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=_encoding(dataset))
-    except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as RuntimeError
-        raise OutputError(f"cannot write {output}: {error}; the finished units are safe in its shards") from None
-
-
 def differing_variables(one: xarray.Dataset, other: xarray.Dataset) -> list[str]:
     """Names of the variables in which two datasets do not have the same bits.
 
@@ -213,30 +226,3 @@ def same_bits(one: xarray.Dataset, other: xarray.Dataset, name: str) -> bool:
     if a.dtype.kind not in "biuf":  # words, in whatever way they are held
         return bool(a.ravel().tolist() == b.ravel().tolist())
     return bool(a.dtype == b.dtype and a.tobytes() == b.tobytes())
-
-
-def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
-    """NaN is what a missing number is; integers have none, and no attribute should say so."""
-    return {str(name): {"_FillValue": None} for name, values in dataset.variables.items() if values.dtype.kind != "O"}
-
-
-def open_dataset(path: Path) -> xarray.Dataset:
-    """The dataset in a file, loaded and closed.
-
-    Raises
-    ------
-    OutputError
-        If the file is missing or is not the result of a sweep.
-    """
-    import xarray
-
-    try:
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
-            dataset = stored.load()
-    except OSError as error:
-        raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
-    except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
-        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
-    if "study_digest" not in dataset.attrs:
-        raise OutputError(f"{path} is not the result of a sweep: it has no attribute study_digest")
-    return dataset

@@ -15,9 +15,10 @@ from etc_engine.durable.lock import Holder, alive, read_holder
 from etc_engine.errors import EtcError
 from etc_engine.study.sweep import Study, read_study
 from etc_engine.sweep.claim import difference
-from etc_engine.sweep.dataset import assemble, open_dataset
+from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.plan import Unit, units_to_run
 from etc_engine.sweep.records import Record, encode
+from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.shards import SUFFIX, ShardReader, read_study_file, shard_folder
 from etc_engine.sweep.sweep import Realize, run_unit
 from etc_engine.sweep.table import tabulate
@@ -46,6 +47,7 @@ class Forecast:
     shard_bytes: int
     dataset_bytes: int
     remarks: tuple[str, ...]
+    packings: tuple[str, ...] = ()
 
     def seconds(self, units: int) -> float:
         """Time for so many units on all ranks: an even mixture of the costliest and the cheapest."""
@@ -85,7 +87,16 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
         shard_bytes=len(encode(record)) * len(units),
         dataset_bytes=assemble(study, tabulate(study, []), {}).nbytes,
         remarks=tuple(messages),
+        packings=_packings(study),
     )
+
+
+def _packings(study: Study) -> tuple[str, ...]:
+    """The packings of a study over files, a line for each."""
+    columns = study.realization_coordinates()
+    if not columns:
+        return ()
+    return tuple(f"{file}, frame {frame}" for file, frame in zip(columns["file"][0], columns["frame"][0], strict=True))
 
 
 def what_is_there(study: Study, output: Path) -> tuple[str, set[tuple[int, int]]]:
@@ -109,14 +120,14 @@ def _in_shards(study: Study, folder: Path) -> tuple[str, set[tuple[int, int]]]:
         return f"shards of another study{what}: --resume is refused, --overwrite starts anew", set()
     reader = ShardReader(folder)
     done = {(int(i), int(r)) for i, r in tabulate(study, reader.read(reader.files())).units}
-    return f"{len(done)} finished units in shards ({reader.damaged} damaged): --resume goes on", done
+    return f"{len(done)} finished units in shards ({reader.damaged} damaged): --resume continues", done
 
 
 def _in_output(study: Study, output: Path) -> tuple[str, set[tuple[int, int]]]:
     try:
         digest = open_dataset(output).attrs["study_digest"]
     except EtcError as error:
-        return f"{error}: only --overwrite would go on", set()
+        return f"{error}: only --overwrite would continue", set()
     if digest != study.digest():
         return "the output of another study: --resume is refused, --overwrite starts anew", set()
     every = {(i, r) for i in range(len(study.densities)) for r in range(study.statistics.cap)}

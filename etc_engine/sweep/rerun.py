@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
-from etc_engine.study.sweep import Study
+from etc_engine.study.sweep import study_of
 from etc_engine.sweep.dataset import INCIDENTAL, assemble, same_bits
 from etc_engine.sweep.plan import Unit
 from etc_engine.sweep.sweep import Realize, run_unit
@@ -48,7 +48,7 @@ def rerun(
     Parameters
     ----------
     dataset : xarray.Dataset
-        From :func:`etc_engine.sweep.dataset.open_dataset`.
+        From :func:`etc_engine.sweep.result_file.open_dataset`.
     density : float or None
         A value of the coordinate (to six digits); None if there is only one.
     realization : int
@@ -61,7 +61,7 @@ def rerun(
     InputError
         If the file has no such cell, or has never run it.
     """
-    study = Study.model_validate(json.loads(dataset.attrs["study_resolved"]))
+    study = study_of(json.loads(dataset.attrs["study_resolved"]))
     row = _density_index(dataset["density"].values, density)
     if not 0 <= realization < dataset.sizes["realization"]:
         last = dataset.sizes["realization"] - 1

@@ -1,7 +1,7 @@
 """The scheduler: every rank computes, and takes its next unit from a shared counter.
 
 The counter lives in a window of one-sided MPI on rank 0; a rank adds one to it and reads what was there
-(Fetch_and_op), without rank 0 doing anything. One process needs no MPI: `Solo` answers the same calls.
+(Fetch_and_op), without any work of rank 0. One process needs no MPI: `Solo` takes the same calls.
 This is the only module that imports mpi4py, and only when a launcher started more than one process.
 """
 
@@ -53,7 +53,7 @@ class Communicator(Protocol):
         """Return when every rank is here; call ``meanwhile`` now and then."""
 
     def add(self, slot: int, increment: int) -> int:
-        """Add to a shared counter (slots 0 to 3) and answer what was there before."""
+        """Add to a shared counter (slots 0 to 3) and return what was there before."""
 
     def close(self) -> None:
         """Give back what the counters hold; every rank calls it."""
@@ -84,7 +84,7 @@ class Solo:
         meanwhile()
 
     def add(self, slot: int, increment: int) -> int:
-        """Add to a counter and answer what was there before."""
+        """Add to a counter and return what was there before."""
         before = self._slots[slot]
         self._slots[slot] += increment
         return before
@@ -207,7 +207,7 @@ def connect(environment: Mapping[str, str] = os.environ) -> Communicator:
 
 
 def on_rank_zero(communicator: Communicator, action: Callable[[], T]) -> T:
-    """What an action answers on rank 0, on every rank; an EtcError there is raised on every rank."""
+    """What an action returns on rank 0, on every rank; an EtcError there is raised on every rank."""
     answer: tuple[T | None, EtcError | None] = (None, None)
     if communicator.rank == 0:
         try:

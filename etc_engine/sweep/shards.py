@@ -9,7 +9,7 @@ Beside ``out.nc`` stands the folder ``out.nc.shards``::
 Each rank of each run appends to a file of its own, one ``write`` a unit, so that nothing finished is lost
 when the process is killed, and old ranks that live on never write into the file of another. Rewriting the
 whole shard for every unit (temporary file, sync, rename) would give no more, at a cost that grows with the
-square of the units; a line that was cut short is told by its checksum and the unit is run again. Syncing
+square of the units; a line that was cut short is recognised by its checksum and the unit is run again. Syncing
 to the disk guards against a crash of the machine; it is done as often as it takes at most `SYNC_SHARE` of
 the time.
 """
@@ -86,11 +86,11 @@ class ShardWriter:
             self._take_back()
             raise OutputError(
                 f"cannot write shard {self.path}: {error.strerror}; what is in it stays, "
-                "make room and go on with --resume"
+                "make room and continue with --resume"
             ) from None
 
     def _take_back(self) -> None:
-        """Cut off a record that was written in part; where that fails too its checksum tells."""
+        """Cut off a record that was written in part; where that fails too, its checksum shows the damage."""
         if self._file >= 0:
             with suppress(OSError):
                 os.ftruncate(self._file, self._length)

@@ -27,10 +27,11 @@ from etc_engine.realization import Realization, RealizationSpec, Status
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.attributes import global_attributes
 from etc_engine.sweep.claim import Claim, Policy, claim_output, recorded_runs
-from etc_engine.sweep.dataset import assemble, open_dataset, write_dataset
+from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.gathering import Gatherer
 from etc_engine.sweep.plan import Unit, next_targets, unit_rng, units_to_run
 from etc_engine.sweep.records import Record, failed_realization
+from etc_engine.sweep.result_file import open_dataset, write_dataset
 from etc_engine.sweep.scheduler import STOP, Communicator, on_rank_zero
 from etc_engine.sweep.shards import ShardWriter, clear_folder, shard_path
 from etc_engine.sweep.table import Table
@@ -192,7 +193,7 @@ def _plan_round(claim: Claim, table: Table, targets: tuple[int, ...], computed: 
 
 
 def _run_round(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
-    """Compute the units of a round on all ranks; answers the reason if any of them stopped early."""
+    """Compute the units of a round on all ranks; returns the reason if any of them stopped early."""
     reason = _compute(round_, communicator, realize, stop)
     communicator.wait_for_all(lambda: round_.tell(communicator))
     reasons = communicator.gather(reason)
@@ -200,7 +201,7 @@ def _run_round(round_: _Round, communicator: Communicator, realize: Realize, sto
 
 
 def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
-    """Take units until there are none; answers why this rank stopped early, or nothing.
+    """Take units until there are none; returns why this rank stopped early, or nothing.
 
     Every rank takes one number beyond the last unit: the next round's base allows for it.
     """
@@ -227,10 +228,22 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
 
 
 def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize: Realize) -> Record:
-    """One realization; what it raises becomes its result."""
+    """One realization; what it raises becomes its result.
+
+    Raises
+    ------
+    OutputError
+        If the machine, not the unit, failed: no memory or no disk. That is no result; the unit runs again later.
+    """
     started = time.time()
     try:
-        result = realize(spec, unit_rng(study.seed, unit))
+        result = realize(study.for_realization(spec, unit.realization), unit_rng(study.seed, unit))
+    except (MemoryError, OSError) as error:
+        place = "the packer's own density" if unit.density is None else f"density {unit.density:g}"
+        raise OutputError(
+            f"realization {unit.realization} at {place} met a failure of the machine "
+            f"({type(error).__name__}: {error}): make room and continue with --resume"
+        ) from None
     except Exception as error:
         result = failed_realization(error, spec)
     return Record(unit, result, rank, socket.gethostname(), started, time.time())

@@ -25,7 +25,7 @@ from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.transient import ParticleSystem
 from etc_engine.packing.particles import ParticlePacking, particle_values
 from etc_engine.particle_files.trajectory import Trajectory
-from etc_engine.solvers.marching import march
+from etc_engine.solvers.marching import MarchState, march
 
 Build = Callable[[ContactNetwork, NDArray[np.float64]], ParticleSystem]
 """(network, heat capacity of each particle [J/(m K)]) -> system; walls, materials and sources are the builder's.
@@ -128,6 +128,46 @@ def named_frame(trajectory: Trajectory, frame: int) -> Iterator[None]:
         raise
 
 
+@dataclass(frozen=True)
+class Stepping:
+    """How the time between two frames is stepped.
+
+    Parameters
+    ----------
+    scheme : str
+        A name of `etc_engine.solvers.marching.SCHEMES`.
+    steps : int
+        Steps from frame to frame; ``adaptive`` finds its own.
+    tolerance, solver_tolerance : float
+        As in `etc_engine.solvers.marching.march`.
+    progress : callable, optional
+        Called with the time after every step.
+    """
+
+    scheme: str = "bdf2"
+    steps: int = 4
+    tolerance: float = 1e-3
+    solver_tolerance: float = 1e-10
+    progress: Callable[[float], None] | None = None
+
+    def march(self, system: ParticleSystem, temperatures: NDArray[np.float64], low: float, high: float) -> MarchState:
+        """The state of a system at the end of an interval."""
+        *_, ended = march(
+            system.heat,
+            system.initial(temperatures),
+            [low, high],
+            scheme=self.scheme,
+            steps=None if self.scheme == "adaptive" else self.steps,
+            tolerance=self.tolerance,
+            solver_tolerance=self.solver_tolerance,
+            progress=self.progress,
+        )
+        return ended
+
+
+DEFAULT_STEPPING = Stepping()
+
+
 def march_trajectory(
     trajectory: Trajectory,
     contacts: Callable[[ParticlePacking], ContactNetwork],
@@ -136,12 +176,8 @@ def march_trajectory(
     *,
     heat_capacity: ArrayLike = 1.0,
     expansion: ThermalExpansion | None = None,
-    scheme: str = "bdf2",
-    steps: int = 4,
-    tolerance: float = 1e-3,
-    solver_tolerance: float = 1e-10,
+    stepping: Stepping = DEFAULT_STEPPING,
     restart: MovingState | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> Iterator[MovingState]:
     """Temperatures of moving particles at the time of every frame.
 
@@ -158,16 +194,9 @@ def march_trajectory(
     heat_capacity : float or array_like, shape (n,) [J/(m3 K)]
         rho c of all particles, or of each.
     expansion : ThermalExpansion, optional
-    scheme : str
-        A name of `etc_engine.solvers.marching.SCHEMES`.
-    steps : int
-        Steps from frame to frame; ``adaptive`` finds its own.
-    tolerance, solver_tolerance : float
-        As in `etc_engine.solvers.marching.march`.
+    stepping : Stepping
     restart : MovingState, optional
-        A state of the same run, to go on from; the other arguments are still those of the start.
-    progress : callable, optional
-        Told the time after every step.
+        A state of the same run, to continue from; the other arguments are still those of the start.
 
     Yields
     ------
@@ -227,16 +256,7 @@ def march_trajectory(
         if frame < state.frame:
             continue
         with named_frame(trajectory, frame):
-            *_, ended = march(
-                system.heat,
-                system.initial(state.temperatures),
-                [low, high],
-                scheme=scheme,
-                steps=None if scheme == "adaptive" else steps,
-                tolerance=tolerance,
-                solver_tolerance=solver_tolerance,
-                progress=progress,
-            )
+            ended = stepping.march(system, state.temperatures, low, high)
         temperatures = system.particle_temperatures(ended.temperatures)
         rates = system.heat.rates(high, ended.temperatures)
         before = network

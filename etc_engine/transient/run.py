@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from etc_engine.box import Box, parse_periodic
+from etc_engine.box import parse_periodic
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.medium.medium import Medium
@@ -20,14 +20,16 @@ from etc_engine.medium.walls import knots_of, value_at
 from etc_engine.packing import ParticlePacking, pack
 from etc_engine.particle_files.dumps import read_trajectory
 from etc_engine.particle_files.formats import format_to_read, read_particles
+from etc_engine.particle_files.table import ParticleTable
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
 from etc_engine.realization.media import contact_network
 from etc_engine.solvers.marching import MarchState, march
 from etc_engine.solvers.overflow import representable_numbers
-from etc_engine.study.transient import FileTable, Gradient, NetworkStudy, refuse_endless
+from etc_engine.study.transient import FileTable, NetworkStudy, refuse_endless
 from etc_engine.study.walls import plain
-from etc_engine.transient.moving import MovingState, ThermalExpansion, march_trajectory, named_frame
+from etc_engine.transient.moving import MovingState, Stepping, ThermalExpansion, march_trajectory, named_frame
+from etc_engine.transient.selection import conductivity_of, initial_of, part_of, rows_of
 from etc_engine.transient.states import State, claimed_states, write_state
 
 Progress = Callable[[float], None]
@@ -47,7 +49,7 @@ class Transient:
     system : ParticleSystem
         At the start.
     states : list of MarchState, or of MovingState with [motion]
-        One an output time; fewer if the run was stopped.
+        One per output time; fewer if the run was stopped.
     times : ndarray [s]
         All output times.
     trajectory : Trajectory, optional
@@ -56,6 +58,8 @@ class Transient:
         How many of the states a former run had written.
     stopped : str
         The signal that ended the run, empty if it reached the end.
+    tables : tuple of ParticleTable
+        What was read of the particles: one, or with [motion] one per frame.
     """
 
     study: NetworkStudy
@@ -66,6 +70,7 @@ class Transient:
     trajectory: Trajectory | None = None
     resumed: int = 0
     stopped: str = ""
+    tables: tuple[ParticleTable, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +83,7 @@ class _Course:
     march: Callable[[State | None], Iterator[State]]
     kind: type[MarchState] | type[MovingState]
     trajectory: Trajectory | None = None
+    tables: tuple[ParticleTable, ...] = ()
 
 
 @representable_numbers()
@@ -99,9 +105,9 @@ def run_transient(
     output : Path, optional
         The file that is to be written; its states are kept beside it, for `resume`.
     resume : bool
-        Whether to go on from the last state that a former run has written: it gives the same bits.
+        Whether to continue from the last state that a former run has written; the bits are the same.
     progress : callable, optional
-        Told the fraction of the time span that is done.
+        Called with the fraction of the time span that is done.
 
     Returns
     -------
@@ -112,7 +118,7 @@ def run_transient(
     InputError, GeometryError, PackingError, ConvergenceError, OutputError
     """
     course = (_still if study.motion is None else _moving)(study, folder, progress)
-    made = Transient(study, course.network, course.system, [], course.times, course.trajectory)
+    made = Transient(study, course.network, course.system, [], course.times, course.trajectory, tables=course.tables)
     if output is None:
         return replace(made, states=[_finite(state) for state in course.march(None)])
     with (
@@ -140,10 +146,10 @@ def _finite(state: State) -> State:
 
 def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
     """One packing, marched over the output times."""
-    packing, column = _particles(study, folder)
-    network = _contacts(study, packing)
-    system = _physics(study, packing.count, column).system(network)
-    initial = system.initial(_initial(study, packing))
+    table = _particles(study, folder)
+    network = _contacts(study, table.packing)
+    system = _physics(study, table).system(network)
+    initial = system.initial(initial_of(study, table))
     time = study.time
 
     def marched(restart: State | None) -> Iterator[State]:
@@ -161,7 +167,7 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
             progress=_fraction(progress, time.times[0], time.times[-1]),
         )
 
-    return _Course(network, system, np.array(time.times), marched, MarchState)
+    return _Course(network, system, np.array(time.times), marched, MarchState, tables=(table,))
 
 
 def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
@@ -172,13 +178,15 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     path = folder / file.files
     if not path.exists():
         raise StudyError(f"packing.files: there is no file {path}")
-    trajectory = read_trajectory(path, motion.timestep)
+    trajectory = read_trajectory(path, motion.timestep, part_of(file))
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
         raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
     if first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, first.dimension):
         raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
-    physics = _physics(study, first.count, trajectory.conductivity)
+    physics = _physics(study, trajectory.tables[0])
+
+    told = _fraction(progress, trajectory.times[0], trajectory.times[-1])
 
     def contacts(packing: ParticlePacking) -> ContactNetwork:
         return _contacts(study, packing)
@@ -189,21 +197,18 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
             trajectory,
             contacts,
             physics.system,
-            _initial(study, first),
+            initial_of(study, trajectory.tables[0]),
             heat_capacity=np.asarray(study.particles.heat_capacity, dtype=np.float64),
             expansion=ThermalExpansion(motion.expansion, motion.reference) if motion.expansion else None,
-            scheme=time.scheme,
-            steps=time.steps or 1,
-            tolerance=time.tolerance,
+            stepping=Stepping(time.scheme, time.steps or 1, time.tolerance, progress=told),
             restart=restart,
-            progress=_fraction(progress, trajectory.times[0], trajectory.times[-1]),
         )
 
     refuse_endless(time, trajectory.times)
     with named_frame(trajectory, 0):
         network = contacts(first)
         system = physics.system(network)
-    return _Course(network, system, trajectory.times, marched, MovingState, trajectory)
+    return _Course(network, system, trajectory.times, marched, MovingState, trajectory, trajectory.tables)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,59 +235,41 @@ class _Physics:
         )
 
 
-def _physics(study: NetworkStudy, count: int, column: NDArray[np.float64] | None) -> _Physics:
-    particles = study.particles
-    if column is not None and "conductivity" in particles.model_fields_set:
-        raise StudyError("particles.conductivity: the particle file has a column of that name, take one of them out")
-    return _Physics(study, particles.conductivity if column is None else column, _source(study, count))
-
-
-def _initial(study: NetworkStudy, packing: ParticlePacking) -> ArrayLike:
-    initial = study.particles.initial
-    if isinstance(initial, Gradient):
-        if len(initial.gradient) != packing.dimension:
-            raise StudyError(
-                f"particles.initial.gradient: expected {packing.dimension} numbers, found {len(initial.gradient)}"
-            )
-        return np.asarray(initial.value + packing.centers @ np.array(initial.gradient))
-    return initial
+def _physics(study: NetworkStudy, table: ParticleTable) -> _Physics:
+    return _Physics(study, conductivity_of(study, table), _source(study, table))
 
 
 def _fraction(progress: Progress | None, begin: float, end: float) -> Progress | None:
-    """A progress that is told the time instead of the fraction that is done."""
+    """A progress function of the time instead of the fraction that is done."""
     if progress is None:
         return None
     tell = progress
     return lambda t: tell((t - begin) / (end - begin))
 
 
-def _particles(study: NetworkStudy, folder: Path) -> tuple[ParticlePacking, NDArray[np.float64] | None]:
-    """The packing, and the conductivity of each particle where its file gives it."""
+def _particles(study: NetworkStudy, folder: Path) -> ParticleTable:
+    """The packing, and what its file says of each particle."""
     words = study.packing
     if isinstance(words, FileTable):
         path = folder / words.files
         if not path.exists():
             raise StudyError(f"packing.files: there is no file {path}")
-        box = None if words.box is None else Box(words.box, parse_periodic(words.periodic or "", len(words.box)))
-        if box is None and not format_to_read(path).brings_box:
+        if words.box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
-        table = read_particles(path, box, None if words.frames == "last" else words.frames)
-        return table.packing, table.conductivity
+        return read_particles(path, frame=None if words.frames == "last" else words.frames, sample=part_of(words))
     spec = words.spec(words.density, radius_growth=study.contacts.rule == "overlap")
-    return pack(spec, np.random.default_rng(study.seed)), None
+    return ParticleTable(pack(spec, np.random.default_rng(study.seed)))
 
 
 def _contacts(study: NetworkStudy, packing: ParticlePacking) -> ContactNetwork:
     return contact_network(packing, study.contacts.rule, study.contacts.values())
 
 
-def _source(study: NetworkStudy, count: int) -> HeatSource:
-    """Heat set free in each particle at a time; sources on one particle add up."""
-    parts = []
+def _source(study: NetworkStudy, table: ParticleTable) -> HeatSource:
+    """Heat released in each particle at a time; sources on one particle add up."""
+    parts, count = [], table.packing.count
     for k, source in enumerate(study.source):
-        rows = np.arange(count) if source.particles is None else np.array(source.particles, dtype=np.int64)
-        if rows.size and rows.max() >= count:
-            raise StudyError(f"source.{k}: there is no particle {rows.max()}, the last one is {count - 1}")
+        rows = rows_of(source, table, f"source.{k}")
         parts.append((np.bincount(rows, minlength=count).astype(np.float64), plain(source.heat)))
 
     def heat(t: float) -> NDArray[np.float64]:
@@ -298,6 +285,8 @@ def _digest(study: NetworkStudy, course: _Course) -> str:
     box = packings[0].box
     arrays = [box.lengths, box.periodic, course.times, course.system.heat.conductance.data]
     arrays += [values for packing in packings for values in (packing.centers, packing.radii)]
+    if study.particles.initial == "file":
+        arrays += [table.temperature for table in course.tables[:1] if table.temperature is not None]
     for values in arrays:
         whole.update(np.asarray(values, dtype=np.float64).tobytes())
     return whole.hexdigest()

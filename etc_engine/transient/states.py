@@ -1,4 +1,4 @@
-"""States of a transient on disk: a run that was killed goes on from the last one, with the same bits.
+"""States of a transient on disk: a run that was killed continues from the last one, with the same bits.
 
 Beside ``out.nc`` stands the folder ``out.nc.states`` with a file for each output time, put in place whole or not at
 all, a lock (see `etc_engine.durable.lock`) and the digest of the study and of its particles.
@@ -73,7 +73,7 @@ def read_states(folder: Path, kind: type[MarchState] | type[MovingState] = March
 def claimed_states(
     output: Path, digest: str, kind: type[MarchState] | type[MovingState], *, resume: bool
 ) -> Iterator[tuple[Path, list[State]]]:
-    """The locked folder of states of an output, and what is in it to go on from.
+    """The locked folder of states of an output, and the states in it to continue from.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def claimed_states(
     kind : type
         Of the states.
     resume : bool
-        Whether to go on from former states; otherwise they are removed.
+        Whether to continue from former states; otherwise they are removed.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
-from etc_engine.transient.moving import MovingState, march_trajectory
+from etc_engine.transient.moving import MovingState, Stepping, march_trajectory
 
 WALLS = {"bottom": FixedTemperature(1.0), "top": FixedTemperature(0.0)}
 PECLET = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
@@ -44,7 +44,7 @@ def sheared(bed: Trajectory, peclet: float) -> list[MovingState]:
     rest = pipe_conductivity(medium_of(network), axes=(1,)).solutions[0].temperatures[:, 0]
     start = np.where(np.isnan(rest), 1.0 - bed.packings[0].centers[:, 1] / height, rest)
     timed = Trajectory(bed.times / rate, bed.packings, bed.ids)
-    return list(march_trajectory(timed, overlap_contacts, pipes, start, steps=2))
+    return list(march_trajectory(timed, overlap_contacts, pipes, start, stepping=Stepping(steps=2)))
 
 
 def flux(bed: Trajectory, states: list[MovingState]) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from etc_engine.sweep.dataset import open_dataset
+from etc_engine.sweep.result_file import open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from etc_engine.sweep.dataset import write_dataset
+from etc_engine.sweep.result_file import write_dataset
 
 STUDIES = Path(__file__).parents[2] / "studies"
 # for each study: the text that makes it small, and words that its analysis prints

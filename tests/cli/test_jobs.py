@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from etc_engine.sweep.dataset import open_dataset
+from etc_engine.sweep.result_file import open_dataset
 
 ROOT = Path(__file__).parents[2]
 JOBS = ROOT / "jobs"

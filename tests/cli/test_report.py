@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from etc_engine.sweep.dataset import write_dataset
+from etc_engine.sweep.result_file import write_dataset
 
 STUDY = """
 schema = 2
@@ -79,6 +79,7 @@ def test_the_page_holds_everything_itself(result, tmp_path, etc_engine):
         "conductivity",
         "statistics",
         "models",
+        "sensitivity",
         "realizations",
         "size",
         "histograms",

@@ -187,3 +187,19 @@ def test_samples_that_cannot_be_are_refused(etc_engine, options, words):
     assert done.returncode == 2
     assert words in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_conductivities_by_type(etc_engine):
+    plain = solved(etc_engine("solve", BED, "--json"))["conductivity"]
+    same = solved(etc_engine("solve", BED, "--types", "1=1,2=1", "--json"))["conductivity"]
+    twice = solved(etc_engine("solve", BED, "--types", "1=2,2=2", "--json"))["conductivity"]
+    mixed = solved(etc_engine("solve", BED, "--types", "1=1,2=2", "--json"))["conductivity"]
+    assert same == plain
+    assert twice == pytest.approx(2.0 * plain, rel=1e-9)
+    assert plain < mixed < twice
+    for words, said in (
+        (("--types", "1=1"), "the conductivity of 2 is missing"),
+        (("--types", "1:1"), "TYPE=CONDUCTIVITY"),
+        (("--types", "1=1,2=1", "--conductivity", 2), "leave --conductivity out"),
+    ):
+        assert said in etc_engine("solve", BED, *words).stderr

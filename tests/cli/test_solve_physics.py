@@ -81,3 +81,33 @@ def test_refusals_are_one_line(bed, options, message, capfd):
     assert run(["solve", *bed, *options]) == 2
     error = capfd.readouterr().err
     assert message in error and error.count("\n") == 1
+
+
+def test_walls_of_two_temperatures(tmp_path, capfd):
+    """Properties at the local temperature: the wall's mean for a small difference, more radiation for a large one."""
+    r, n = 0.5e-3, 3
+    grid = (np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) + 0.5) * 2.0 * r
+    file = tmp_path / "bed.csv"
+    file.write_text("x,y,z,radius\n" + "\n".join(",".join(repr(float(v)) for v in (*x, r)) for x in grid) + "\n")
+    bed = [str(file), "--box", ",".join([repr(2.0 * r * n)] * 3), "--periodic", "xy", "--axis", "z"]
+    gas = ["--gas", "helium", "--pressure", "1e5", "--emissivity", "0.8", "--material", "alumina"]
+    near = solved(capfd, *bed, *gas, "--wall-temperatures", "601:599")
+    assert near["conductivity_between_walls"] == pytest.approx(near["conductivity"], rel=1e-4)
+    assert abs(near["heat_imbalance"]) < 1e-7
+    far = solved(capfd, *bed, *gas, "--wall-temperatures", "300:900")
+    assert far["conductivity"] == pytest.approx(near["conductivity"], rel=1e-9)
+    assert far["heat_flow"] == pytest.approx(far["conductivity_between_walls"] * 600.0 * 2.0 * r * n, rel=1e-9)
+    assert far["conductivity_between_walls"] != pytest.approx(near["conductivity"], rel=1e-4)
+    assert far["nonlinear_iterations"] > 2
+
+
+@pytest.mark.parametrize(
+    ("extra", "message"),
+    [
+        (["--wall-temperatures", "900"], "two temperatures"),
+        (["--wall-temperatures", "900:600"], "method facets and one --axis"),
+    ],
+)
+def test_what_walls_need(bed, capfd, extra, message):
+    assert run(["solve", *bed, *extra]) == 2
+    assert message in capfd.readouterr().err

@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 import xarray
 
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 STUDY = """
@@ -168,7 +169,7 @@ def test_an_existing_output_is_refused_resumed_or_replaced(stand_in, study, tmp_
     refused = stand_in(study, "-o", output, "--log", log)
     assert refused.returncode == 2
     assert refused.stderr.splitlines() == [
-        f"etc-engine: {output} exists: go on with --resume, or start anew with --overwrite"
+        f"etc-engine: {output} exists: continue with --resume, or start anew with --overwrite"
     ]
     resumed = stand_in(study, "-o", output, "--log", log, "--policy", "resume")
     assert resumed.returncode == 0
@@ -237,7 +238,7 @@ def test_a_full_disk_stops_resumably(stand_in, study, tmp_path):
     stopped = process(study, "-o", output, "--log", log, "--file-limit", 3000)
     assert stopped.returncode == 75
     assert "cannot write shard" in stopped.stderr
-    assert "go on with --resume" in stopped.stderr
+    assert "continue with --resume" in stopped.stderr
     resumed = process(study, "-o", output, "--policy", "resume", "--log", log, "--file-limit", 20000)
     assert resumed.returncode == 75  # the shards fit, the dataset does not
     assert f"cannot write {output}" in resumed.stderr

@@ -169,7 +169,7 @@ def test_a_warning_signal_stops_early_and_says_so(tmp_path):
     _, errors = running.communicate(timeout=60)
     assert running.returncode == 75
     assert "stopped early (SIGTERM): " in errors
-    assert "go on with --resume" in errors
+    assert "continue with --resume" in errors
 
 
 def test_another_study_does_not_go_on_from_these_states(etc_engine, tmp_path):

@@ -23,8 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
 from etc_engine.sweep.plan import Unit
+from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.shards import ShardReader, shard_folder
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"

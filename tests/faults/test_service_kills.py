@@ -26,7 +26,8 @@ from serving import STUDY, Service, until
 from etc_engine.service import client
 from etc_engine.service.launchers import find_mpiexec
 from etc_engine.service.processes import ProcessIdentity, batch_processes
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 pytestmark = [
     pytest.mark.slow,

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
@@ -88,6 +89,39 @@ def test_contact_angle_curves_are_the_same_on_two_ranks_and_say_how_they_were_so
     words, snapshots = (results[0][name].values for name in ("solved_by", "snapshots"))
     assert set(words.ravel().tolist()) == {"full", "reduced"}
     np.testing.assert_array_equal(snapshots > 0, words == "reduced")
+
+
+SPHERES = """
+schema = 2
+name = "spheres"
+seed = 20263
+[packing]
+method = "lubachevsky-stillinger"
+radii = "equal:0.14"
+box = [1.0, 1.0, 1.0]
+periodic = "xyz"
+density = [0.60, 0.72]
+[contacts]
+rule = "bonded"
+bond_gap = 0.05
+contact_angle = [2.0, 8.0]
+[conduction]
+method = ["chord", "exact"]
+[statistics]
+realizations = 3
+"""
+
+
+@needs_mpi
+def test_spheres_have_the_same_bits_for_any_number_of_ranks(study, tmp_path):
+    study.write_text(SPHERES)
+    results = []
+    for count in (0, 2, 4):
+        output = tmp_path / f"spheres{count}.nc"
+        assert ranks(count, "-m", "etc_engine", "sweep", str(study), "-o", str(output)).returncode == 4
+        results.append(open_dataset(output))
+    assert differing_variables(results[0], results[1]) == differing_variables(results[0], results[2]) == []
+    assert (results[0]["status"].sel(density=0.72) == 2).all()
 
 
 @needs_mpi

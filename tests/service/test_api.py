@@ -13,7 +13,8 @@ from serving import STUDY, Service, ask, renamed, until
 from etc_engine.comparison import simulated
 from etc_engine.errors import InputError, OutputError
 from etc_engine.service import client
-from etc_engine.sweep.dataset import differing_variables, open_dataset
+from etc_engine.sweep.dataset import differing_variables
+from etc_engine.sweep.result_file import open_dataset
 
 PARTICLES = b"x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n"
 

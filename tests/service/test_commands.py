@@ -11,7 +11,7 @@ from serving import STUDY, Service, renamed, until
 from etc_engine.cli.remote import progress_of
 from etc_engine.errors import OutputError
 from etc_engine.service import client
-from etc_engine.sweep.dataset import open_dataset
+from etc_engine.sweep.result_file import open_dataset
 
 TOKEN = "a-token-of-some-length"
 
@@ -70,7 +70,7 @@ def test_who_waits_outlasts_a_new_start_of_the_service(tmp_path):
         waiter.start()
         until(lambda: client.status(service.server, study)["done"] >= 1)
         server = service.server
-    words = rf"the study goes on; ask again with: etc-engine fetch {study}"
+    words = rf"the study continues; ask again with: etc-engine fetch {study}"
     with pytest.raises(OutputError, match=words):
         client.wait(server, study, interval=0.1, patience=0.3)
     with Service(data, {"port": port}, slow=True):

@@ -11,7 +11,7 @@ import pytest
 from serving import STUDY, Service, renamed, until
 
 from etc_engine.service import client
-from etc_engine.sweep.dataset import open_dataset
+from etc_engine.sweep.result_file import open_dataset
 
 SLOW_ENGINE = Path(__file__).with_name("slow_engine.py")
 SBATCH = """echo "sbatch $*" >> "$SITE/calls"

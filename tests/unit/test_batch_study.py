@@ -72,7 +72,7 @@ def test_without_density_the_packer_decides():
         ("[10.0, 2.5]", "[90]", ("contacts.contact_angle[0]", "found 90", "between 0 and 90")),
         ("contact_angle = [10.0, 2.5]", "", ("contacts", "bonded", "contact_angle")),
         ('"bonded"', '"overlap"', ("contacts", "contact_angle", "overlap")),
-        ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded, coordination")),
+        ('"bonded"', '"glued"', ("contacts.rule", "found 'glued'", "overlap, bonded, radius, coordination")),
         ("[statistics]", '[conduction]\nmethod = "cord"\n[statistics]', ("method", "found 'cord'", "chord")),
         (
             "[statistics]",

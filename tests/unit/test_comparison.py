@@ -12,6 +12,7 @@ from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import InputError
 from etc_engine.models import evaluate
 from etc_engine.models.filled_polymers import agari_uno, lewis_nielsen
+from etc_engine.sweep.statistics import interval
 
 OVERLAP = """
 schema = 2
@@ -128,7 +129,9 @@ def test_failed_and_single_realizations(made_sweep):
     result = evaluate_models(dataset)
     assert result["count"].values.tolist() == [4, 4, 4, 1, 0]
     assert result["conductivity_mean"].isnull().values.tolist() == [False] * 4 + [True]
-    assert result["half_width"].isnull().values.tolist() == [False] * 3 + [True] * 2
+    # four zeros bound the fraction that percolates, not the mean of those that would
+    assert result["half_width"].isnull().values.tolist() == [True, False, False, True, True]
+    assert result["percolating_fraction"].values[:2].tolist() == [0.0, 1.0]
     assert result["relative_difference"].isel(density=0).isnull().all()  # nothing is relative to 0
     assert result.attrs["bound_broken"] == 0
     assert np.isfinite(result["rms_relative_difference"]).all()  # over the densities that have a conductivity
@@ -257,3 +260,17 @@ def test_why_there_is_no_fit(made_sweep):
     convex = {fit.model: fit for fit in fit_models(made_sweep(OVERLAP, lambda f, *_: np.exp(60.0 * (f - 0.9))))}
     assert "end of its range" in convex["percolation_power_law"].note
     assert convex["percolation_power_law"].parameters == ()
+
+
+def test_cells_that_do_not_always_percolate_have_skewed_intervals_and_their_fraction(made_sweep):
+    """Three of four realizations conduct: dataset, comparison and `interval` say the same."""
+    dataset = made_sweep(OVERLAP, lambda *place: 0.0 if place[3] == 1 else 0.3 + 0.01 * place[3])
+    expected = interval([0.3, 0.0, 0.32, 0.33], dataset.attrs["confidence_level"])
+    result = evaluate_models(dataset)
+    cell = dataset.isel(density=0, direction_i=0)
+    assert float(cell["percolating_fraction"]) == float(result["percolating_fraction"][0]) == 0.75
+    assert float(cell["conductivity_mean_percolating"]) == pytest.approx(expected.percolating_mean)
+    for bounds in (cell.isel(direction_j=0), result.isel(density=0)):
+        assert float(bounds["conductivity_ci_low"]) == pytest.approx(expected.low)
+        assert float(bounds["conductivity_ci_high"]) == pytest.approx(expected.high)
+    assert expected.high - expected.mean < expected.mean - expected.low

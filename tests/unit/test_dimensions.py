@@ -16,9 +16,10 @@ from etc_engine.realization import Outcome, Realization, Status
 from etc_engine.service.curve import curve_of
 from etc_engine.study.quantities import QUANTITIES, SWEPT
 from etc_engine.study.sweep import parse_study
-from etc_engine.sweep.dataset import assemble, open_dataset
+from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.plan import Unit, next_targets
 from etc_engine.sweep.records import Record, decode, encode
+from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.table import tabulate
 
 SPACE = """

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from etc_engine import Box, Medium, ParticlePacking, Pores, bonded_contacts, effective_conductivity, march
+from etc_engine import (
+    Box,
+    Medium,
+    ParticlePacking,
+    Pores,
+    bonded_contacts,
+    effective_conductivity,
+    march,
+    overlap_contacts,
+)
 from etc_engine.engines.dtem.facet_medium import medium_links
 from etc_engine.errors import InputError
 from etc_engine.medium.conduction import Conduction
@@ -118,3 +127,29 @@ def test_early_rate_of_a_bed_is_that_of_the_wall_film():
     heat = [float((system.capacities * system.particle_temperatures(state.temperatures)).sum()) for state in states]
     assert np.all(np.diff(heat) > 0.0)
     assert heat[-1] < system.capacities.sum()
+
+
+def test_spheres_cut_by_walls_at_any_depth_are_solved_and_reported():
+    """A crop goes through spheres anywhere, up to their centres."""
+    rng = np.random.default_rng(31)
+    whole = bed((True, True, True), (4, 4, 4), seed=31)
+    engine = find_engine("dtem")
+    cut = 0
+    for low in rng.uniform(0.0, 1.0, 6):
+        inside = (whole.centers[:, 2] > low) & (whole.centers[:, 2] < low + 2.5)
+        packing = ParticlePacking(
+            whole.centers[inside] - [0.0, 0.0, low],
+            whole.radii[inside] + 0.08,
+            Box((4.0, 4.0, 2.5), (True, True, False)),
+        )
+        medium = Medium(packing, 30.0, overlap_contacts(packing), Pores(1.0))
+        result = effective_conductivity(medium, axes=(2,))
+        assert 1.0 < result.tensor[2, 2] < 30.0
+        cut += any("cut so deep" in text for text in engine.remarks("facets", result))
+    assert cut > 0
+
+
+def test_loose_packings_are_reported():
+    medium = Medium(bed(), 30.0, pores=Pores(1.0))
+    remarks = find_engine("dtem").remarks("facets", effective_conductivity(medium, axes=(2,)))
+    assert any("dense beds" in text for text in remarks)

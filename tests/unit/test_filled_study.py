@@ -16,7 +16,7 @@ from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import RealizationSpec, Status, realize
 from etc_engine.service.curve import curve_of
 from etc_engine.study.sweep import Study, parse_study
-from etc_engine.sweep.dataset import open_dataset
+from etc_engine.sweep.result_file import open_dataset
 
 STUDY = """
 schema = 2

@@ -75,6 +75,23 @@ def test_standard_input(monkeypatch):
     same(read_particles("-"))
 
 
+def test_errors_name_standard_input(monkeypatch):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"hello\n")))
+    with pytest.raises(InputError, match="standard input is not a format I know"):
+        read_particles("-")
+
+
+def test_netcdf_in_single_precision_has_a_step(tmp_path):
+    import xarray
+
+    write_particles(tmp_path / "a.nc", ParticleTable(ParticlePacking(CENTERS, RADII, BOX)))
+    assert read_particles(tmp_path / "a.nc").printed is None
+    with xarray.open_dataset(tmp_path / "a.nc") as data:
+        data.load().astype(np.float32).to_netcdf(tmp_path / "b.nc", engine="netcdf4")
+    printed = read_particles(tmp_path / "b.nc").printed
+    assert printed.radius.step(RADII) == pytest.approx(2.0**-23 * RADII)
+
+
 def test_units_become_metres(tmp_path):
     (tmp_path / "a.dump").write_text("ITEM: UNITS\ncgs\n" + DUMPS["plain"])
     table = read_particles(tmp_path / "a.dump", sample=Sample(crop=((0.0, 1.0), (0.25, 2.0), (0.0, 1.0))))

@@ -11,6 +11,7 @@ import pytest
 from etc_engine.box import Box
 from etc_engine.medium.conduction import Conduction
 from etc_engine.packing import PackingSpec, pack, parse_radii
+from etc_engine.particle_files.table import ParticleTable
 from etc_engine.realization import RealizationSpec, Status, realize
 from etc_engine.realization.media import make_media
 
@@ -83,7 +84,7 @@ def test_media_share_what_does_not_change():
     spec = replace(SPEC, axes=axes, values=values)
     rng = np.random.default_rng(71)
     packing = pack(spec.packing, rng)
-    media = make_media(packing, spec, rng, contacts=True)
+    media = make_media(ParticleTable(packing), spec, rng, contacts=True)
     assert len(media) == 8
     assert {id(medium.packing) for medium in media} == {id(packing)}
     assert len({id(medium.network) for medium in media}) == 4  # the conductivity changes no contacts
@@ -182,7 +183,7 @@ def test_a_mixture_is_met_to_the_nearest_particle_and_lies_between_its_materials
     mixed = replace(mixed, axes={"contact_angle": (0.1,), "mixture_fraction": fractions})
     rng = np.random.default_rng(71)
     packing = pack(mixed.packing, rng)
-    second = [medium.conductivity == 10.0 for medium in make_media(packing, mixed, rng, contacts=True)]
+    second = [medium.conductivity == 10.0 for medium in make_media(ParticleTable(packing), mixed, rng, contacts=True)]
     assert [int(chosen.sum()) for chosen in second] == [round(f * packing.count) for f in fractions]
     assert all((~few | many).all() for few, many in pairwise(second))
     k = k_xx(run(mixed)[0])[0, :, 0]

@@ -129,7 +129,9 @@ def test_limits_are_met_before_anything_runs():
     for field, value in (("units", 5), ("cells", 5), ("particles", 50)):
         with pytest.raises(StudyError, match=f"this service allows {value}"):
             apply(STUDY, replace(Limits(), **{field: value}))
-    with pytest.raises(StudyError, match=r"packing\.box: takes about 250 MB of memory a rank, this service allows 200"):
+    with pytest.raises(
+        StudyError, match=r"packing\.box: takes about 250 MB of memory per rank, this service allows 200"
+    ):
         apply(STUDY, replace(Limits(), memory_bytes=200_000_000))
     adaptive = STUDY + "relative_ci = 0.01\nmax_realizations = 50\n"
     assert (apply(adaptive, Limits()).units, apply(adaptive, Limits()).most) == (6, 100)

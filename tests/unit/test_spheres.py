@@ -8,13 +8,14 @@ from scipy.special import spherical_jn
 
 from etc_engine.box import Box
 from etc_engine.engines.dtem.closed_form import closed_form_resistances
+from etc_engine.engines.dtem.conductivity import conductivity_curve
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.steady import solve_steady
 from etc_engine.engines.dtem.storage import readings_of_parts, storing_elements
 from etc_engine.engines.pipe.steady import pipe_conductivity
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.sphere import chord_resistance, mutual_resistance, standard_resistance
-from etc_engine.medium.conductances import mean_field_conductivity
+from etc_engine.medium.conductances import contact_conductances, mean_field_conductivity
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
 from etc_engine.medium.sides import contact_sides
@@ -161,6 +162,8 @@ def test_contacts_that_meet_and_what_else_cannot_be_are_refused():
         bonded_contacts(triple, np.radians(90.0))
     with pytest.raises(GeometryError, match="one lies inside the other"):
         overlap_contacts(ParticlePacking([[1.0, 1.0, 1.0], [1.1, 1.0, 1.0]], [0.5, 0.2], box))
+    with pytest.raises(GeometryError, match=r"apart|coincide"):
+        overlap_contacts(ParticlePacking([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0]], [0.5, 0.5], box))
     with pytest.raises(InputError, match="method enhanced of engine dtem works in 2D, found a medium in 3D"):
         effective_conductivity(medium_of(bonded_contacts(triple, 0.1)), method="enhanced")
 
@@ -235,3 +238,43 @@ def test_heat_is_conserved_and_volumes_add_up(walled):
     *_, state = march(pipes.heat, pipes.initial(0.0), [0.0, 0.02], steps=50)
     stored = 2.0 * network.cut_measures(prescribed=True) @ pipes.particle_temperatures(state.temperatures)
     assert stored == pytest.approx(state.heat[0], rel=1e-8)
+
+
+def test_a_curve_of_angles_agrees_with_its_full_solutions(periodic):
+    """A reduced basis over the contact half-angles: 1e-8 of full solutions."""
+    shrunk = ParticlePacking(periodic.centers, periodic.radii / 1.06, periodic.box)
+    angles = np.radians([1.0, 2.0, 4.0, 6.0, 8.0, 10.0])
+    media = medium_of(bonded_contacts(shrunk, 0.1, 0.15))
+    points = conductivity_curve(media, angles)
+    assert any(point.snapshots for point in points)
+    for angle, point in zip(angles, points, strict=True):
+        full = effective_conductivity(medium_of(bonded_contacts(shrunk, angle, 0.15))).tensor
+        assert point.tensor == pytest.approx(full, rel=3e-8, abs=1e-9 * full.max())
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.03])
+def test_the_estimate_covers_what_chord_misses(periodic, growth):
+    packing = ParticlePacking(periodic.centers, periodic.radii * growth, periodic.box)
+    medium = medium_of(overlap_contacts(packing))
+    chord, exact = (effective_conductivity(medium, method=method) for method in ("chord", "exact"))
+    missed = np.abs(np.diag(chord.tensor) / np.diag(exact.tensor) - 1.0).max()
+    assert missed < chord.model_error < 6.0 * missed
+    assert exact.model_error < 0.3 * missed
+
+
+def test_pipes_of_small_contacts_and_of_dem_codes(periodic):
+    """2 kappa c, and sqrt(pi) times as much; both go through the contact radius alone."""
+    medium = medium_of(overlap_contacts(periodic), 3.0)
+    network = medium.links
+    width = packing_widths(network)
+    between, _ = contact_conductances(medium, "holm")
+    assert between == pytest.approx(2.0 * 3.0 * width, rel=1e-12)
+    holm, area = (effective_conductivity(medium, engine="pipe", method=m).tensor for m in ("holm", "root-area"))
+    assert area == pytest.approx(np.sqrt(np.pi) * holm, rel=1e-9, abs=1e-12)
+
+
+def packing_widths(network):
+    """Radius of the common circle of two spheres, from their positions."""
+    r, t = network.packing.radii[network.pairs].T
+    d = np.linalg.norm(network.branches, axis=1)
+    return np.sqrt((-d + r + t) * (d - r + t) * (d + r - t) * (d + r + t)) / (2.0 * d)

@@ -7,6 +7,8 @@ import pytest
 
 from etc_engine import Medium, effective_conductivity
 from etc_engine.comparison import evaluate_models, model_lines
+from etc_engine.comparison.sensitivity import sensitivities
+from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import StudyError
 from etc_engine.materials import find_solid, gas_state, jump_length
 from etc_engine.medium.conditions import Conditions, pores_at
@@ -195,3 +197,35 @@ def test_bed_models_take_their_inputs_from_the_result(made_sweep):
     lines = model_lines(comparison)["model_conductivity"]
     at = lines.sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
     assert at.values.ravel()[0] == pytest.approx(float(expected), rel=1e-12)
+
+
+def test_the_slope_of_a_power_law_is_its_exponent(made_sweep):
+    pytest.importorskip("CoolProp")
+    data = made_sweep(BED, lambda _, values, *__: 1e-3 * values["pressure"] ** 0.25 * values["temperature"] ** 1.5)
+    found = sensitivities(simulated(data))
+    np.testing.assert_allclose(found["pressure"], 0.25, rtol=1e-9)
+    np.testing.assert_allclose(found["temperature"], 1.5, rtol=1e-9)
+    assert list(found) == ["pressure", "temperature"]
+    np.testing.assert_allclose(found["temperature"]["temperature"], [np.sqrt(400.0 * 800.0)])
+
+
+def test_a_solid_as_a_table_of_the_user():
+    pytest.importorskip("CoolProp")
+    own = "{ temperature = [300.0, 900.0], conductivity = [2.0, 8.0], source = 'our lab' }"
+    study = parse_study(BED.replace('"alumina"', own))
+    np.testing.assert_allclose(derived_conductivities(study)["particle_conductivity"][1], [3.0, 7.0])
+    assert parse_study(BED.replace('"alumina"', own)).digest() == study.digest()
+    with pytest.raises(StudyError, match=r"particles.material: .*needs a column 'conductivity'"):
+        parse_study(BED.replace('"alumina"', "{ temperature = [300.0, 900.0] }"))
+    with pytest.raises(StudyError, match=r"particles.material: .*from 300 to 700 K"):
+        parse_study(BED.replace('"alumina"', own.replace("900.0", "700.0")))
+
+
+def test_a_mixture_of_gases():
+    pytest.importorskip("CoolProp")
+    study = parse_study(BED.replace('"helium"', "{ helium = 0.5, argon = 0.5 }"))
+    pure = [derived_conductivities(parse_study(BED.replace("helium", gas))) for gas in ("helium", "argon")]
+    low, high = sorted(one["pore_conductivity"][1][1, 0] for one in pure)
+    assert low < derived_conductivities(study)["pore_conductivity"][1][1, 0] < high
+    with pytest.raises(StudyError, match=r"must add up to 1, found 0\.9"):
+        parse_study(BED.replace('"helium"', "{ helium = 0.5, argon = 0.4 }"))

@@ -15,7 +15,7 @@ from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import SCHEMES, march
-from etc_engine.transient.moving import ThermalExpansion, march_trajectory
+from etc_engine.transient.moving import Stepping, ThermalExpansion, march_trajectory
 
 
 def pipes(network, capacities, walls=None, **more):
@@ -52,7 +52,7 @@ def test_heat_is_conserved_while_contacts_open_and_close(build, scheme):
             build,
             start,
             heat_capacity=np.linspace(1.0, 3.0, trajectory.count),
-            scheme=scheme,
+            stepping=Stepping(scheme),
         )
     )
     assert sum(state.opened for state in states) > 10
@@ -79,7 +79,7 @@ def test_particles_that_stay_are_the_plain_march():
     packing = wandering().packings[0]
     trajectory = Trajectory([0.0, 0.01, 0.02], [packing] * 3)
     start = np.random.default_rng(55).random(packing.count)
-    *_, moved = march_trajectory(trajectory, overlap_contacts, pipes, start, scheme="backward-euler", steps=3)
+    *_, moved = march_trajectory(trajectory, overlap_contacts, pipes, start, stepping=Stepping("backward-euler", 3))
     system = pipes(overlap_contacts(packing), packing.measures)
     *_, plain = march(system.heat, system.initial(start), [0.0, 0.02], scheme="backward-euler", steps=6)
     np.testing.assert_allclose(moved.temperatures, plain.temperatures, rtol=1e-9)
@@ -90,7 +90,7 @@ def test_a_pair_exchanges_heat_only_while_it_touches():
     box, radius = Box((4.0, 1.0)), 0.3
     near, far = (ParticlePacking([[1.0, 0.5], [x, 0.5]], [radius, radius], box) for x in (1.58, 2.5))
     trajectory = Trajectory([0.0, 0.1, 0.3, 0.4], [near, far, near, near])
-    states = list(march_trajectory(trajectory, overlap_contacts, pipes, [1.0, 0.0], steps=200))
+    states = list(march_trajectory(trajectory, overlap_contacts, pipes, [1.0, 0.0], stepping=Stepping(steps=200)))
     (conductance,), _ = contact_conductances(medium_of(overlap_contacts(near)))
     rate = 2.0 * conductance / (np.pi * radius**2)
     for state, touched in zip(states, (0.0, 0.1, 0.1, 0.2), strict=True):

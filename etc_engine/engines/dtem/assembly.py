@@ -90,7 +90,7 @@ def _assemble_csr(
     free: NDArray[np.int64],
     size: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-    """CSR arrays (data, indices, indptr), columns sorted, entries of a repeated column summed."""
+    """K = sum_p P_p^T K_p P_p as CSR arrays (data, indices, indptr), columns sorted, repeated columns summed."""
     # the (at most two) element rows of every unknown
     element = np.full((size, 2), -1, dtype=np.int64)
     local = np.zeros((size, 2), dtype=np.int64)

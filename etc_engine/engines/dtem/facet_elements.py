@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.element import Elements, Resistances, condense, packed_starts
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.laws.rings import FacingSpheres, condense_pairs, legendre_means
+from etc_engine.laws.rings import WIDEST_CONTACT, FacingSpheres, condense_pairs, legendre_means
 from etc_engine.medium.facets import FacetLinks
 
 TERMS = 64
@@ -34,6 +34,9 @@ TERMS = 64
 SMALL_FACET = 0.02
 """Facets below this part of the squared radius of the smaller sphere are columns alone."""
 REPAIR_POWER = 1.25
+WIDE_CONTACT = np.sin(np.radians(30.0))
+"""Contacts wider than this, in radii, may overlap other facets of their sphere."""
+HALVINGS = 30
 _NEGLIGIBLE_COLUMN = 1e-9  # in squared radii
 
 
@@ -172,7 +175,8 @@ def facing_spheres(links: FacetLinks, material: FacetMaterial, rows: NDArray[np.
     ends[~wall] = links.pairs[rows[~wall]]
     ends[wall] = links.wall_particles[rows[wall] - m, None]
     area = np.concatenate([links.areas, links.wall_areas])[rows]
-    twice, contacts = np.where(wall, 2.0, 1.0), links.contacts[rows]
+    twice = np.where(wall, 2.0, 1.0)
+    contacts = np.minimum(links.contacts[rows], WIDEST_CONTACT * links.smaller_radii[rows])
     return FacingSpheres(
         twice * links.lengths[rows],
         np.minimum(np.maximum(np.sqrt(area / np.pi), contacts), links.smaller_radii[rows]),
@@ -295,17 +299,20 @@ def _fill(sides, rows, condensed, scales, repair, weights, starts, out):  # type
 def facet_elements(sides: FacetSides, h: Resistances) -> Elements:
     """Conductivity matrices K_e = P (P^T H P)^-1 P^T of all spheres.
 
+    Where H is not positive definite (walls or contacts cut a sphere so deep that its facets overlap), the coupling
+    between the facets of that sphere is halved, in ``h`` too, until it is; `weakened_spheres` counts such spheres.
+
     Raises
     ------
     GeometryError
-        If the resistance matrix of a sphere is not positive definite.
+        If that does not help.
     """
     values = np.zeros_like(h.values)
     bad = _invert(sides.offsets, h.starts, h.values, values)
     if bad >= 0:
         raise GeometryError(
-            f"the resistance matrix of sphere {bad} with {sides.offsets[bad + 1] - sides.offsets[bad]} facets is not "
-            f"positive definite: its contact disks are too wide or too close for facet links; use smaller contacts"
+            f"the resistance matrix of sphere {sides.spheres[bad]} with {sides.offsets[bad + 1] - sides.offsets[bad]} "
+            f"facets is not positive definite: walls or contacts cut too much of it off; use smaller contacts"
         )
     return Elements(1, sides.offsets, sides.nodes, h.starts, values)
 
@@ -314,12 +321,47 @@ def facet_elements(sides: FacetSides, h: Resistances) -> Elements:
 def _invert(
     offsets: NDArray[np.int64], starts: NDArray[np.int64], resistances: NDArray[np.float64], values: NDArray[np.float64]
 ) -> int:
-    """K_e of every element; returns the first that fails, or -1."""
+    """K_e of every element; halves H_ij, i != j, of those that are not positive definite. Returns a failure, or -1."""
     for p in range(offsets.size - 1):
         n = offsets[p + 1] - offsets[p]
         if n < 2:
             continue
         h = resistances[starts[p] : starts[p + 1]].reshape((n, n))
-        if not condense(h, n, 1, np.empty((n, n)), values[starts[p] : starts[p + 1]]):
-            return p
+        for attempt in range(HALVINGS + 1):
+            if condense(h, n, 1, np.empty((n, n)), values[starts[p] : starts[p + 1]]):
+                break
+            if attempt == HALVINGS:
+                return p
+            weaken(h)
     return -1
+
+
+@njit(cache=True)
+def weaken(h: NDArray[np.float64]) -> None:
+    """Halve the coupling between the facets of one sphere, in place; raise what resists less than nothing.
+
+    The disk of a sphere cut near its middle has h < 0 in the gauge of the law; it takes the smallest h > 0 there is.
+    """
+    least = np.inf
+    for i in range(h.shape[0]):
+        if h[i, i] > 0.0:
+            least = min(least, h[i, i])
+    for i in range(h.shape[0]):
+        h[i, i] = max(h[i, i], least)
+        for j in range(i):
+            h[i, j] *= 0.5
+            h[j, i] = h[i, j]
+
+
+def weakened_spheres(links: FacetLinks, material: FacetMaterial, sides: FacetSides, h: Resistances) -> int:
+    """Number of spheres whose coupling was halved: their matrices are not those of the law any more."""
+    widest = np.zeros(sides.spheres.size)
+    np.maximum.at(widest, np.repeat(sides.spheres, np.diff(sides.offsets)), links.contacts[sides.links[sides.nodes]])
+    doubtful = np.flatnonzero(widest > WIDE_CONTACT * links.packing.radii[sides.spheres])
+    if not doubtful.size:
+        return 0
+    sample = sample_sides(sides, doubtful)
+    fresh = facet_resistances(links, material, sample)
+    used = np.concatenate([h.values[h.starts[p] : h.starts[p + 1]] for p in doubtful])
+    changed = np.add.reduceat((fresh.values != used).astype(np.int64), fresh.starts[:-1])
+    return int(np.count_nonzero(changed))

@@ -135,7 +135,7 @@ def _solve_alike(
     if len(found) < len(materials):
         lift = lift_and_prescribed(links, sides, axes)[0]
         products = _reduced_products(lift, list(solutions.values()), elements)
-        floor = 0.01 * float(misfit.max())  # a fit to the sample does not fit all the others as closely
+        floor = 0.05 * float(misfit.max())  # a fit to the sample does not fit all the others as closely
         for row in range(len(materials)):
             if row not in found:
                 mixed = np.tensordot(coefficients[:, row], products, axes=1)

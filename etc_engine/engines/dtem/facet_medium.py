@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -10,12 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.facet_elements import FacetMaterial, FacetSides, facet_resistances, facet_sides
+from etc_engine.engines.dtem.facet_elements import (
+    FacetMaterial,
+    FacetSides,
+    facet_elements,
+    facet_resistances,
+    facet_sides,
+)
 from etc_engine.engines.dtem.facet_family import FEW_MATERIALS, FamilyMember, solve_family
 from etc_engine.engines.dtem.facet_steady import (
     FacetSolution,
+    accuracy_warnings,
     facet_conductivity,
-    low_coordination_warning,
     uniform_material,
 )
 from etc_engine.engines.dtem.storage import with_states
@@ -138,7 +145,7 @@ def _family(
     media: Sequence[Medium], rows: Sequence[int], links: FacetLinks, conduction: Conduction
 ) -> dict[int, Result]:
     """Results of the media that could be solved together."""
-    axes, box = conduction.axes, links.packing.box
+    axes, box, start = conduction.axes, links.packing.box, time.perf_counter()
     try:
         materials = [medium_material(media[row], links) for row in rows]
         by_group = {
@@ -147,8 +154,20 @@ def _family(
         }
     except EtcError:
         return {}
+    each = (time.perf_counter() - start) / len(rows)
+    unknowns = max(
+        report.unknowns
+        for members in by_group.values()
+        for member in members
+        if member.solution is not None
+        for report in member.solution.reports
+    )
     return {
-        row: _joined(links, {group: members[place] for group, members in by_group.items()})
+        row: replace(
+            _joined(links, {group: members[place] for group, members in by_group.items()}),
+            unknowns=unknowns,
+            seconds=each,
+        )
         for place, row in enumerate(rows)
     }
 
@@ -168,7 +187,7 @@ def _joined(links: FacetLinks, members: Mapping[tuple[int, ...], FamilyMember]) 
     return EffectiveConductivity(
         tensor,
         tuple(spanned),
-        max((report.unknowns for report in reports), default=0),
+        0,
         max((report.iterations for report in reports), default=0),
         max([member.relative_error for member in members.values()] + [r.relative_energy_error for r in reports]),
         solutions if full else (),
@@ -177,11 +196,8 @@ def _joined(links: FacetLinks, members: Mapping[tuple[int, ...], FamilyMember]) 
 
 
 def accuracy_remarks(_: str, result: EffectiveConductivity[FacetSolution]) -> tuple[str, ...]:
-    """A warning where spheres with few facets conduct much better than the pores."""
-    if not result.solutions:
-        return ()
-    text = low_coordination_warning(result.solutions[0].links, result.solutions[0].material)
-    return (text,) if text else ()
+    """Warnings where facet links are known to be inaccurate."""
+    return accuracy_warnings(result.solutions[0]) if result.solutions else ()
 
 
 def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> ParticleField:
@@ -289,6 +305,7 @@ def sphere_system(
     sides = facet_sides(links, kept, bool((material.open_fluid > 0.0).all()))
     scales = material.conductivity * links.packing.radii
     h = facet_resistances(links, material, sides)
+    facet_elements(sides, h)  # mends what is not positive definite
     elements, bad = with_states(h, sides.offsets, sides.nodes, scales, 3, dipoles=dipoles)
     if bad >= 0:
         cure = "leave the dipoles out or use smaller contacts" if dipoles else "use smaller contacts"

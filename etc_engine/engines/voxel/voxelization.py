@@ -6,11 +6,10 @@ import os
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.engines.voxel.conductivity import VoxelConductivity
-from etc_engine.engines.voxel.fractions import ball_in_box
+from etc_engine.engines.voxel.pieces import Pieces, find_pieces
 from etc_engine.errors import InputError
 from etc_engine.medium.backbone import joined_axes
 from etc_engine.medium.medium import Medium
@@ -18,7 +17,6 @@ from etc_engine.medium.phases import ROUNDING, check_phases, of_owners
 from etc_engine.packing.neighbors import neighbor_pairs
 
 # the sphere or disk within half-spaces, which the exact union of a packing is made of
-from etc_engine.structure.union import GAUSS_NODES, cut_disk_area, cut_sphere_volume, particle_cuts
 
 VOXELS = ("laminate", "binary")
 FADING = 100.0
@@ -29,9 +27,6 @@ FEWEST = 4
 
 FIELDS = 7
 """Vector fields that the solver holds at once."""
-
-GRAIN = 1e-9
-"""Part of a voxel below which a plane or a sphere does not cut it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,22 +45,6 @@ class VoxelImage:
     conductivity: VoxelConductivity
     volume_fraction: float
     fractions: NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """What the inclusions occupy: whole voxels, and pieces of voxels.
-
-    ``owner`` is the inclusion of a whole voxel or -1; a piece is row ``inclusion``'s ``fraction`` of ``voxel``, with
-    ``normal`` from its centre to the voxel's and whether it holds the voxel's centre.
-    """
-
-    owner: NDArray[np.int64]
-    voxel: NDArray[np.int64]
-    inclusion: NDArray[np.int64]
-    fraction: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    central: NDArray[np.bool_]
 
 
 def grid_shape(lengths: tuple[float, ...], resolution: int) -> tuple[int, ...]:
@@ -196,7 +175,7 @@ def voxelize(medium: Medium, resolution: int = 64, voxels: str = "laminate") -> 
         raise InputError(f"a grid has at least 2 voxels along an edge, found a resolution of {resolution}")
     check_phases(medium)
     shape = grid_shape(medium.packing.box.lengths, resolution)
-    pieces = _find_pieces(medium, shape)
+    pieces = find_pieces(medium.packing, shape)
     fractions = np.bincount(pieces.voxel, pieces.fraction, pieces.owner.size).astype(np.float64)
     fractions[pieces.owner >= 0] = 1.0
     scalars = of_owners(medium, pieces.owner)
@@ -213,28 +192,7 @@ def voxelize(medium: Medium, resolution: int = 64, voxels: str = "laminate") -> 
     return VoxelImage(layered, float(fractions.mean()), fractions.reshape(shape))
 
 
-def _find_pieces(medium: Medium, shape: tuple[int, ...]) -> _Pieces:
-    inclusions = medium.packing
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
-    angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
-    steps = np.asarray(inclusions.box.lengths) / np.asarray(shape)
-    starts, normals, cuts = particle_cuts(inclusions)
-    owner, count, voxel, inclusion, fraction, normal, central = _walk(
-        inclusions.centers,
-        inclusions.radii,
-        np.asarray(inclusions.box.periodic),
-        np.asarray(shape),
-        steps,
-        starts,
-        np.ascontiguousarray(normals),
-        cuts,
-        angles,
-        shares,
-    )
-    return _Pieces(owner, voxel[:count], inclusion[:count], fraction[:count], normal[:count], central[:count])
-
-
-def _laminates(medium: Medium, pieces: _Pieces) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def _laminates(medium: Medium, pieces: Pieces) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Voxels that an interface crosses: flat numbers, principal conductivities (the normal one first), axes."""
     d = medium.dimension
     rows, of = np.unique(pieces.voxel, return_inverse=True)
@@ -320,108 +278,3 @@ def _frame(normals: NDArray[np.float64]) -> NDArray[np.float64]:
     scale = 2.0 / (mirror**2).sum(axis=1)
     frames = np.eye(d) - scale[:, None, None] * mirror[:, :, None] * mirror[:, None, :]
     return frames * np.where(np.arange(d) == 0, -sign[:, None], 1.0)[:, None, :]
-
-
-@njit(cache=True)
-def _walk(centers, radii, periodic, shape, steps, starts, normals, cuts, angles, shares):  # type: ignore[no-untyped-def]
-    """Walk over the voxels of every inclusion; a plane is walked as one layer of space."""
-    d = centers.shape[1]
-    owner = np.full(np.prod(shape), -1, dtype=np.int64)
-    count, room = 0, 1024
-    voxel, inclusion = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
-    fraction, normal = np.empty(room), np.empty((room, d))
-    central = np.empty(room, dtype=np.bool_)
-    volume = np.prod(steps)
-    first, last, index = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
-    low, high, middle = np.empty(d), np.empty(d), np.empty(d)
-    for row in range(radii.size):
-        radius = radii[row]
-        for a in range(d):
-            first[a] = np.floor((centers[row, a] - radius) / steps[a])
-            last[a] = np.floor((centers[row, a] + radius) / steps[a])
-            if not periodic[a]:
-                first[a], last[a] = max(first[a], 0), min(last[a], shape[a] - 1)
-        own_normals, own_cuts = normals[starts[row] : starts[row + 1]], cuts[starts[row] : starts[row + 1]]
-        for i in range(first[0], last[0] + 1):
-            for j in range(first[1], last[1] + 1):
-                for k in range(first[2], last[2] + 1):
-                    index[0], index[1], index[2] = i, j, k
-                    flat, square = 0, 0.0
-                    for a in range(d):
-                        low[a] = index[a] * steps[a] - centers[row, a]
-                        high[a] = (index[a] + 1) * steps[a] - centers[row, a]
-                        middle[a] = 0.5 * (low[a] + high[a])
-                        square += middle[a] * middle[a]
-                        flat = flat * shape[a] + index[a] % shape[a]
-                    part = _share(radius, low, high, own_normals, own_cuts, volume, angles, shares)
-                    if part <= GRAIN:
-                        continue
-                    if part >= 1.0 - GRAIN:
-                        owner[flat] = row
-                        continue
-                    if count == room:
-                        room *= 2
-                        voxel, inclusion = _longer(voxel, room), _longer(inclusion, room)
-                        fraction, central = _longer(fraction, room), _longer(central, room)
-                        wider = np.empty((room, d))
-                        wider[:count] = normal
-                        normal = wider
-                    voxel[count], inclusion[count], fraction[count] = flat, row, part
-                    distance = np.sqrt(square)
-                    for a in range(d):
-                        normal[count, a] = middle[a] / distance if distance > 0.0 else (1.0 if a == 0 else 0.0)
-                    inside = square < radius * radius
-                    for m in range(own_cuts.size):
-                        inside = inside and np.dot(own_normals[m], middle) <= own_cuts[m]
-                    central[count] = inside
-                    count += 1
-    return owner, count, voxel, inclusion, fraction, normal, central
-
-
-@njit(cache=True)
-def _longer(values, room):  # type: ignore[no-untyped-def]
-    longer = np.empty(room, dtype=values.dtype)
-    longer[: values.size] = values
-    return longer
-
-
-@njit(cache=True)
-def _share(radius, low, high, normals, cuts, volume, angles, shares):  # type: ignore[no-untyped-def]
-    """Part of a voxel, given by its corners from the centre, that an inclusion within its half-spaces fills."""
-    d = low.size
-    nearest, farthest = 0.0, 0.0
-    for a in range(d):
-        near = max(low[a], -high[a], 0.0)
-        far = max(high[a], -low[a])
-        nearest, farthest = nearest + near * near, farthest + far * far
-    if nearest >= radius * radius:
-        return 0.0
-    whole = farthest <= radius * radius
-    crossing = 0
-    for m in range(cuts.size):
-        middle, reach = 0.0, 0.0
-        for a in range(d):
-            middle += 0.5 * (low[a] + high[a]) * normals[m, a]
-            reach += 0.5 * (high[a] - low[a]) * abs(normals[m, a])
-        if middle - reach >= cuts[m] - GRAIN * reach:
-            return 0.0
-        if middle + reach > cuts[m] + GRAIN * reach:
-            crossing += 1
-    if crossing == 0:
-        return 1.0 if whole else min(ball_in_box(radius, low, high) / volume, 1.0)
-    planes, distances = np.zeros((2 * d + crossing, d)), np.empty(2 * d + crossing)
-    for a in range(d):
-        planes[2 * a, a], distances[2 * a] = 1.0, high[a]
-        planes[2 * a + 1, a], distances[2 * a + 1] = -1.0, -low[a]
-    crossing = 2 * d
-    for m in range(cuts.size):
-        middle, reach = 0.0, 0.0
-        for a in range(d):
-            middle += 0.5 * (low[a] + high[a]) * normals[m, a]
-            reach += 0.5 * (high[a] - low[a]) * abs(normals[m, a])
-        if middle + reach > cuts[m] + GRAIN * reach:
-            planes[crossing], distances[crossing] = normals[m], cuts[m]
-            crossing += 1
-    if d == 2:
-        return min(cut_disk_area(radius, planes, distances) / volume, 1.0)
-    return min(cut_sphere_volume(radius, planes, distances, angles, shares) / volume, 1.0)

@@ -53,7 +53,7 @@ class WallProjection:
         kinds = np.concatenate((np.zeros((d, 3 - d), dtype=np.int64), sine.astype(np.int64)), axis=1)
         signs = np.where(np.arange(d) == self.axis, 1.0, -1.0)
         ones = (np.ones(1),) * (3 - d)
-        _project(spectrum.reshape(d, *flat, *self.shape), kinds, signs, *ones, *self.own, *ones, *self.cross)
+        _project(spectrum.reshape(d, *flat, *self.shape), kinds, signs, (*ones, *self.own), (*ones, *self.cross))
         for a in range(d):
             part = spectrum[a]
             for t in range(d):
@@ -113,8 +113,10 @@ def wall_projection(
 
 
 @njit(cache=True)
-def _project(spectrum, kinds, signs, own_x, own_y, own_z, cross_x, cross_y, cross_z):  # type: ignore[no-untyped-def]
+def _project(spectrum, kinds, signs, own, cross):  # type: ignore[no-untyped-def]
     """Project spectra in place; sines (kind 1) start at the wave of one half period, cosines end before that of n."""
+    own_x, own_y, own_z = own
+    cross_x, cross_y, cross_z = cross
     d, n1, n2, n3 = spectrum.shape
     q = np.empty(3)
     for i in range(own_x.size):

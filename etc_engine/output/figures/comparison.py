@@ -192,6 +192,9 @@ def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
         if x.size == 1:
             axes.errorbar(x, mean, [mean - low, high - mean], fmt="none", ecolor=colour, elinewidth=0.9, capsize=3)
         axes.plot(x, mean, marker=marker, color=colour, markersize=4.5, linewidth=1.6, zorder=3)
+        blocked = curve["percolating_fraction"].values < 1.0  # hollow: the mean holds realizations without a path
+        if blocked.any():
+            axes.plot(x[blocked], mean[blocked], marker, color=colour, mfc="white", markersize=4.5, zorder=3.5)
         if MEAN_FIELD in curve["model"].values:
             field = curve["model_conductivity"].sel({"model": MEAN_FIELD}).values
             shade = GREY if axis.curves == "method" else colour  # it is the same for all methods

@@ -19,7 +19,8 @@ function tablesOf(schema) {
     if (node.const !== undefined) return [];
     const items = found.filter(way => way.items).map(way => way.items.type);
     return [{ place, title: node.title || place, hint: node.description || "", needs: node["x-with"] || {}, required,
-      words: node["x-words"] || found.map(way => way.enum).find(Boolean) || null, start: node.default ?? null,
+      words: node["x-words"] || found.map(way => way.enum).find(Boolean) || (types.includes("boolean") ? ["false", "true"] : null),
+      truth: types.includes("boolean"), start: node.default ?? null,
       list: types.includes("array"), single: types.some(type => type !== "array"),
       numbers: [...types, ...items].some(type => type === "number" || type === "integer") }];
   };
@@ -45,7 +46,7 @@ function startOf(schema, tables) {
 }
 
 function parsed(field, word) {
-  const one = piece => field.numbers ? decimal(piece) : piece.trim();
+  const one = piece => field.numbers ? decimal(piece) : field.truth ? piece.trim() === "true" : piece.trim();
   const pieces = word.split(",").filter(piece => piece.trim() !== "");
   return field.list && (pieces.length > 1 || !field.single) ? pieces.map(one) : one(word);
 }

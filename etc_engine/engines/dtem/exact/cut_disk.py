@@ -57,15 +57,18 @@ def source_images(
 def _influence(
     z: complex,
     normal: complex,
-    theta: float,
-    alpha: float,
+    chord: tuple[float, float],
     centre: complex,
     images: NDArray[np.float64],
     lifts: NDArray[np.float64],
     flux: NDArray[np.float64],
     potential: NDArray[np.float64],
 ) -> None:
-    """Flux along ``normal`` and temperature at z of unit sources at the points of another chord."""
+    """Flux along ``normal`` and temperature at z of unit sources at the points of another chord (theta, alpha).
+
+    T = Re[sink(zeta)] + lift_m - ln|zeta - zeta_m|/pi in the half-plane zeta of the chord, flux its derivative.
+    """
+    theta, alpha = chord
     zeta, slope = half_plane(z, theta, alpha)
     up, down = zeta - centre, zeta - np.conj(centre)
     sink_flux = (1.0 / up + 1.0 / down) / (2.0 * np.pi)
@@ -103,8 +106,7 @@ def influence_matrices(
                 _influence(
                     z,
                     normal,
-                    theta[j],
-                    alpha[j],
+                    (theta[j], alpha[j]),
                     centre,
                     images[:count],
                     lifts[:count],
@@ -129,7 +131,7 @@ def potentials_at(
         own = slice(offsets[j], offsets[j + 1])
         count = offsets[j + 1] - offsets[j]
         centre = source_images(alpha[j], points.s[level[j], :count], images[:count], lifts[:count])
-        _influence(z, 1.0 + 0.0j, theta[j], alpha[j], centre, images[:count], lifts[:count], flux[own], values[own])
+        _influence(z, 1.0 + 0.0j, (theta[j], alpha[j]), centre, images[:count], lifts[:count], flux[own], values[own])
     return values
 
 
@@ -176,9 +178,9 @@ def solve_cut_disk(
     points: ChordPoints,
     h: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Kappa H over (chord, mode) into ``h``, and the densities behind it.
+    """Kappa H over (chord, mode) into ``h``, and the densities behind it: g_i + sum_j K_ij g_j = -sum_j K_ij phi_j.
 
-    Answers the offsets of each chord's points, the smooth densities g at them, and the strengths of the point
+    Returns the offsets of each chord's points, the smooth densities g at them, and the strengths of the point
     sources that stand for phi + g away from their own chord, both of shape (points, chords * modes).
     """
     chords = theta.size

@@ -1,0 +1,85 @@
+"""What a user should know of the sample that a particle file makes: digits, bare walls, cut particles, free space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from etc_engine.box import AXES
+from etc_engine.particle_files.precision import doubtful_contacts
+from etc_engine.particle_files.table import ParticleTable
+from etc_engine.structure.filling import find_filling, free_walls
+
+
+def digit_warnings(table: ParticleTable, gap: float, *, bonded: bool) -> list[str]:
+    """Contacts that the printed digits of the file do not decide, in a sentence.
+
+    Parameters
+    ----------
+    table : ParticleTable
+    gap : float
+        Threshold of the contact rule, in mean radii.
+    bonded : bool
+        Whether the rule has a bond gap; overlaps have none.
+    """
+    doubt = doubtful_contacts(table, gap)
+    return [] if doubt is None else [doubt.sentence(gap, bonded=bonded)]
+
+
+def box_warnings(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) -> list[str]:
+    """Walls that the particles do not reach, and walls that go through them, a sentence each.
+
+    Parameters
+    ----------
+    table : ParticleTable
+    driven : sequence of int
+        Axes along which walls drive the heat.
+    gap : float
+        Largest gap of a contact with a wall, in radii.
+    """
+    packing = table.packing
+    filling = find_filling(packing)
+    origin = table.origin or (0.0,) * packing.dimension
+    low, high = packing.radii.min(), packing.radii.max()
+    faces = [
+        f"{AXES[k // 2]} = {origin[k // 2] + (k % 2) * packing.box.lengths[k // 2]:g}" for k in range(2 * len(origin))
+    ]
+    free = set(free_walls(packing, filling).tolist())
+    found = []
+    for wall, distance in enumerate(filling.free.tolist()):
+        if wall // 2 in driven and distance > gap * low:
+            found.append(
+                f"nothing touches the driven wall {faces[wall]}: the nearest surface is {distance:.3g} m away "
+                f"({distance / high:.2g} of the largest radius), so the wall drives no heat; see --crop and --box"
+            )
+        elif wall in free:
+            found.append(
+                f"the box is larger than the sample: between the wall {faces[wall]} and the nearest particle "
+                f"{distance:.3g} m are free, which count as sample; see --crop and --box"
+            )
+    deep = filling.deep_cuts
+    made = np.array(table.cropped or (False,) * deep.size)
+    if deep[~made].any():
+        where = ", ".join(f"{faces[k]} ({deep[k]})" for k in np.flatnonzero((deep > 0) & ~made))
+        found.append(
+            f"walls go through {deep[~made].sum()} particles by more than half a radius: {where}; the box may be "
+            "wrapped around the centres (flag s): give the faces of the container with --box low:high,..."
+        )
+    if deep[made].any():
+        found.append(
+            f"the crop cuts {deep[made].sum()} particles by more than half a radius: its walls touch their middle"
+        )
+    return found
+
+
+def excess_warnings(tensor: ArrayLike, conductivity: ArrayLike) -> list[str]:
+    """A sample conducts no better than its best part; where it does, the box or the contacts are wrong."""
+    best, most = float(np.max(conductivity)), float(np.nanmax(np.diag(np.atleast_2d(tensor))))
+    if most <= best * (1.0 + 1e-9):
+        return []
+    return [
+        f"the conductivity {most:.6g} W/(m K) exceeds that of the particles, {best:.6g}: walls or contacts go "
+        "through particles, see --box and the contact rule"
+    ]
