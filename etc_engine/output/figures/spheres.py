@@ -46,6 +46,7 @@ def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
     image = slice_temperatures(field, PIXELS)
     shown = left.imshow(image, extent=(0, width, 0, height), origin="lower", cmap=COLOURS, norm=scale)
     left.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", aspect="equal", facecolor="0.9")
+    left.locator_params(nbins=6)
     left.set_title(f"slice at {AXES[normal]} = {0.5 * packing.box.lengths[normal]:.3g} m", fontsize=9)
     view, frame = draw_view(packing, COLOURS(scale(np.ma.masked_invalid(field.particle_temperatures))), PIXELS)
     right.imshow(view, extent=frame, interpolation="bilinear", zorder=2)
