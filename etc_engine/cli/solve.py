@@ -110,6 +110,7 @@ def solve_command(
     elastic = asked.physics.youngs_modulus, asked.physics.poisson_ratio
     medium = asked.medium(table, particles, dumped.network(table, words.frame, *elastic))
     axes = _load_axes(asked.axis, medium)
+    medium = _trimmed(medium, table, axes)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
     between = asked.between_walls(medium, method, axes)
@@ -295,6 +296,26 @@ def _write(outputs: _Outputs, field: ParticleField, record: dict[str, Any], tabl
                 low, high = record["conductivity_bounds"]
                 caption += f", bounds {low:.8g} to {high:.8g}"
             save_field(files.enter_context(replacing(outputs.plot)), field, caption)
+
+
+def _trimmed(medium: Medium, table: ParticleTable, axes: tuple[int, ...]) -> Medium:
+    """The medium as the driven walls of a crop leave it; the user is told what they go through."""
+    import numpy as np
+
+    from etc_engine.medium.cut_contacts import trim_crop
+
+    driven = np.repeat(np.isin(np.arange(medium.dimension), axes), 2)
+    walls = np.array(table.cropped or (False,) * driven.size) & driven
+    if not (medium.links.geometric and walls.any()):
+        return medium
+    network, deep, cut = trim_crop(medium.links, walls)
+    if deep:
+        text = f"the crop goes through the middle of {deep} particles; their cut is taken at 75 degrees"
+        click.echo(f"etc-engine: warning: {text}", err=True)
+    if cut:
+        text = f"the crop goes through {cut} contacts between particles, which are left out"
+        click.echo(f"etc-engine: warning: {text}", err=True)
+    return medium.with_network(network)
 
 
 def _warn_of_missing_contacts(network: ContactNetwork, bonded: bool, bond_gap: float) -> None:

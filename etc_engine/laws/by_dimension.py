@@ -14,8 +14,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.laws import disk, sphere, sphere_dents
 
@@ -47,21 +48,24 @@ class ResistanceLaw:
         m, the weight of the first harmonic in kappa R^(d-2) H.
     share : float
         Part of the first harmonic that follows the stored dipole.
+    widest_cut : float
+        Half-angle [rad] up to which a wall may cut the particle with other contacts beside it.
     """
 
     name: str
     contact: str
-    self_resistances: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]]
-    pipe_resistances: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]]
+    self_resistances: Mapping[str, Callable[[ArrayLike], Floats]]
+    pipe_resistances: Mapping[str, Callable[[ArrayLike], Floats]]
     matrices: Callable[
-        [NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], str, NDArray[np.bool_] | None],
-        NDArray[np.float64],
+        [Ints, Floats, Floats, str, Flags | None],
+        Floats,
     ]
-    moments: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
-    cut: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    moments: Callable[[Floats, Floats], Floats]
+    cut: Callable[[Floats], Floats]
     warming: float
     harmonic: float
     share: float
+    widest_cut: float
 
 
 LAWS: Mapping[int, ResistanceLaw] = {
@@ -76,6 +80,7 @@ LAWS: Mapping[int, ResistanceLaw] = {
         warming=(0.125 - np.log(2.0)) / np.pi,
         harmonic=1.0 / np.pi,
         share=6.0 / 7.0,
+        widest_cut=0.5 * np.pi,
     ),
     3: ResistanceLaw(
         "sphere",
@@ -88,6 +93,7 @@ LAWS: Mapping[int, ResistanceLaw] = {
         warming=1.0 / (20.0 * np.pi),
         harmonic=3.0 / (4.0 * np.pi),
         share=7.0 / 8.0,
+        widest_cut=np.radians(75.0),
     ),
 }
 
@@ -109,12 +115,12 @@ def law_of(dimension: int) -> ResistanceLaw:
     return LAWS[dimension]
 
 
-def length_scales(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+def length_scales(radii: Floats, dimension: int) -> Floats:
     """R^(d-2), which multiplies kappa in the resistance of a particle, shape (n,)."""
     return np.asarray(radii ** (dimension - 2))
 
 
-def ball_measure(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+def ball_measure(radii: Floats, dimension: int) -> Floats:
     """Length, area or volume of balls in 1, 2 or 3 dimensions: 2 c, pi c^2, 4/3 pi c^3.
 
     Examples
@@ -125,9 +131,7 @@ def ball_measure(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float
     return np.asarray((2.0, np.pi, 4.0 / 3.0 * np.pi)[dimension - 1] * radii**dimension)
 
 
-def self_resistance(
-    alpha: NDArray[np.float64], radii: NDArray[np.float64], dimension: int, method: str
-) -> NDArray[np.float64]:
+def self_resistance(alpha: Floats, radii: Floats, dimension: int, method: str) -> Floats:
     """Resistance kappa h_ii between a contact and the mean of its particle, dimensionless or, of spheres, [1/m].
 
     Parameters

@@ -17,7 +17,9 @@ import numpy as np
 
 from etc_engine.box import Box
 from etc_engine.packing import PackingSpec, pack, parse_radii
-from etc_engine.realization import ConductionSpec, ContactSpec, RealizationSpec, conduct_dtem
+from etc_engine.particle_files.table import ParticleTable
+from etc_engine.realization import ENGINES, Conduction, RealizationSpec
+from etc_engine.realization.media import make_media
 
 BOND_GAP = 1e-3
 
@@ -27,17 +29,20 @@ def study(disks: int, method: str, angles: int) -> RealizationSpec:
     radii = parse_radii(f"uniform:{0.7 * radius}:{1.3 * radius}")
     return RealizationSpec(
         PackingSpec("advancing-front", radii, Box((1.0, 1.0)), radius_growth=False),
-        ContactSpec("bonded", tuple(np.radians(np.linspace(1.0, 20.0, angles))), BOND_GAP),
-        ConductionSpec(methods=(method,)),
+        "bonded",
+        (Conduction("dtem", method),),
+        {"particle_conductivity": 1.0, "bond_gap": BOND_GAP},
+        {"contact_angle": tuple(np.radians(np.linspace(1.0, 20.0, angles)))},
     )
 
 
-def solve(packing, spec: RealizationSpec, **options):
+def solve(packing, spec: RealizationSpec, curve: str = "reduced", tolerance: float = 1e-10):
     """Seconds and diagonal conductivities, shape (angles, 2), and the cells."""
     start = time.perf_counter()
-    cells = conduct_dtem(packing, replace(spec, conduction=replace(spec.conduction, **options)), None)
+    conduction = replace(spec.conduction[0], options={"angle_curve": curve}, tolerance=tolerance)
+    media = make_media(ParticleTable(packing), spec, np.random.default_rng(0), contacts=True)
+    column = ENGINES["dtem"].conduct(media, conduction, 0)
     seconds = time.perf_counter() - start
-    column = [row[0] for row in cells]
     return seconds, np.array([np.diag(cell.conductivity) for cell in column]), column
 
 
@@ -45,9 +50,9 @@ def compare(disks: int, method: str, angles: int, runs: int) -> None:
     spec = study(disks, method, angles)
     packing = pack(spec.packing, np.random.default_rng(331))
     solve(packing, spec)  # compiles
-    full = min(solve(packing, spec, angle_curve="full")[0] for _ in range(runs))
+    full = min(solve(packing, spec, "full")[0] for _ in range(runs))
     reduced, k, cells = min((solve(packing, spec) for _ in range(runs)), key=lambda found: found[0])
-    _, exact, _ = solve(packing, spec, angle_curve="full", tolerance=1e-12)
+    _, exact, _ = solve(packing, spec, "full", tolerance=1e-12)
     solves = sum(cell.solved_by == "full" for cell in cells)
     worst = max(cell.relative_energy_error for cell in cells)
     print(

@@ -11,7 +11,7 @@ import time
 import numpy as np
 
 from etc_engine import Box, PackingSpec, parse_radii
-from etc_engine.realization import ConductionSpec, ContactSpec, RealizationSpec, realize
+from etc_engine.realization import Conduction, RealizationSpec, realize
 
 
 def main() -> None:
@@ -19,9 +19,10 @@ def main() -> None:
     packing = PackingSpec(
         "advancing-front", parse_radii("uniform:0.01:0.02"), Box((0.97, 0.97)), density=0.75, radius_growth=False
     )
-    angles = ContactSpec("bonded", tuple(np.radians(np.linspace(1.0, 15.0, 10))))
+    angles = {"contact_angle": tuple(np.radians(np.linspace(1.0, 15.0, 10)))}
     for curve in ("reduced", "full"):
-        spec = RealizationSpec(packing, angles, ConductionSpec(angle_curve=curve))
+        conduction = (Conduction("dtem", "chord", {"angle_curve": curve}),)
+        spec = RealizationSpec(packing, "bonded", conduction, {"particle_conductivity": 1.0, "bond_gap": 1e-6}, angles)
         realize(spec, np.random.default_rng(5))
         seconds = []
         for seed in range(6, 16):

@@ -11,14 +11,15 @@ TABLE_2 = Path(__file__).parents[1] / "published" / "data" / "feng2008_table2_pa
 BED = Path(__file__).parents[1] / "data" / "gravity_bed.dump"
 PACK = ("pack", "--radii", "uniform:0.05:0.1", "--box", "1,1", "--seed", 93)
 TRANSIENT = f"""
-schema = 1
+schema = 2
 kind = "network"
 name = "warming"
-particles = "{TABLE_2}"
+[packing]
+files = "{TABLE_2}"
 box = [1.0, 1.0]
 [walls]
 left = {{ type = "fixed", value = 1.0 }}
-[material]
+[particles]
 heat_capacity = 1.0
 initial = 0.0
 [time]

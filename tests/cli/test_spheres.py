@@ -141,6 +141,21 @@ def test_contacts_of_one_radius(etc_engine, tmp_path):
     assert "below the smallest particle's radius 0.2 m, found 0.25 m" in done.stderr
 
 
+def test_a_crop_through_spheres_is_solved_and_told(etc_engine, tmp_path):
+    """Layers of a cubic array, cropped through the middle of two of them and between layers."""
+    centers = np.stack(np.meshgrid(*[np.arange(6)] * 3, indexing="ij"), axis=-1).reshape(-1, 3) + 0.5
+    bed = tmp_path / "bed.csv"
+    np.savetxt(bed, np.c_[centers, np.full(216, 0.505)], delimiter=",", header="x,y,z,radius", comments="")
+    given = ("solve", bed, "--box", "6,6,6", "--periodic", "xy", "--axis", "z", "--json")
+    through = etc_engine(*given, "--crop", ",,0.45:5.55")
+    assert through.returncode == 0, through.stderr
+    assert "through the middle of 72 particles; their cut is taken at 75 degrees" in through.stderr
+    between = etc_engine(*given, "--crop", ",,1:5")
+    assert between.returncode == 0, between.stderr
+    k = [json.loads(done.stdout)["conductivity"] for done in (through, between)]
+    assert k[0] == pytest.approx(k[1], rel=0.03)
+
+
 def test_a_sweep_of_spheres_records_a_packing_that_fails(etc_engine, tmp_path):
     (tmp_path / "study.toml").write_text(SWEEP)
     done = etc_engine("sweep", tmp_path / "study.toml", "-o", tmp_path / "out.nc")

@@ -42,7 +42,7 @@ def test_a_small_sweep_of_random_composites_keeps_the_three_point_bounds(etc_eng
     for pattern, replacement in (
         (r"(?m)^count = .*", "count = 20"),
         (r"density = .*", "density = [0.1, 0.3]"),
-        (r"contrast = .*", "contrast = [0.1, 10.0]"),
+        (r"conductivity = \[.*", "conductivity = [0.1, 10.0]"),
         (r"resolution = .*", f"resolution = {96 if kind == 'disks' else 24}"),
         (r"realizations = .*", "realizations = 3"),
     ):

@@ -74,6 +74,15 @@ def test_random_packings_against_voxels(case):
     assert k == pytest.approx(case["value"], rel=0.015)
 
 
+@pytest.mark.parametrize("case", REFERENCE["unlike"], ids=lambda c: "-".join(f"{k:g}" for k in c["conductivities"]))
+def test_unlike_spheres_against_voxels(case):
+    """Radii 1 and .75, conductivities up to 1:10, a gap of 1 %."""
+    a = 1.75 * 1.01 * 2.0 / np.sqrt(3.0)
+    packing = ParticlePacking([[0.25 * a] * 3, [0.75 * a] * 3], [1.0, 0.75], Box((a, a, a), (True, True, True)))
+    k = np.trace(conductivity(packing, np.array(case["conductivities"]))) / 3.0
+    assert k == pytest.approx(case["value"], rel=0.016)
+
+
 def test_equal_phases_conduct_as_one():
     assert np.trace(conductivity(random_packing("rp1.csv"), 1.0)) / 3.0 == pytest.approx(1.0, abs=0.025)
 

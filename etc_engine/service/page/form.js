@@ -11,14 +11,14 @@ function tablesOf(schema) {
     const inner = named(node), several = inner.anyOf || inner.oneOf;
     return several ? several.flatMap(ways) : inner.type === "null" ? [] : [inner];
   };
-  const fields = (node, place, required) => {
-    const found = ways(node), types = found.map(way => way.type);
+  const fields = (node, place, required, above = {}) => {
+    const found = ways(node), types = found.map(way => way.type), needs = { ...above, ...node["x-with"] };
     const table = found.find(way => way.properties);
     if (table) return Object.entries(table.properties).flatMap(([key, inner]) =>
-      fields(inner, `${place}.${key}`, (table.required || []).includes(key)));
+      fields(inner, `${place}.${key}`, (table.required || []).includes(key), needs));
     if (node.const !== undefined) return [];
     const items = found.filter(way => way.items).map(way => way.items.type);
-    return [{ place, title: node.title || place, hint: node.description || "", needs: node["x-with"] || {}, required,
+    return [{ place, title: node.title || place, hint: node.description || "", needs, required,
       words: node["x-words"] || found.map(way => way.enum).find(Boolean) || (types.includes("boolean") ? ["false", "true"] : null),
       truth: types.includes("boolean"), start: node.default ?? null,
       list: types.includes("array"), single: types.some(type => type !== "array"),
