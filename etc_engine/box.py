@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 
 AXES = "xyz"
@@ -71,18 +71,18 @@ class Box:
         """Length (2D) or area (3D) of the face normal to an axis."""
         return self.volume / self.lengths[axis]
 
-    def image_shift(self, separation: NDArray[np.float64]) -> NDArray[np.int64]:
+    def image_shift(self, separation: Floats) -> Ints:
         """Integer box shifts s for which ``separation + s * lengths`` is shortest; zero across walls."""
         lengths = np.asarray(self.lengths)
         shift = -np.rint(np.asarray(separation) / lengths).astype(np.int64)
         return np.where(np.asarray(self.periodic), shift, 0)
 
-    def minimum_image(self, separation: NDArray[np.float64]) -> NDArray[np.float64]:
+    def minimum_image(self, separation: Floats) -> Floats:
         """Shortest periodic image of separation vectors, shape (..., d)."""
         separation = np.asarray(separation, dtype=np.float64)
         return separation + self.image_shift(separation) * np.asarray(self.lengths)
 
-    def wrap(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def wrap(self, points: Floats) -> Floats:
         """Points brought into [0, length) along the periodic axes, untouched along the others."""
         points = np.asarray(points, dtype=np.float64)
         lengths = np.asarray(self.lengths)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats
 from etc_engine.comparison.inputs import known_inputs
 from etc_engine.comparison.simulation import Phases, mean_diagonal, phases, simulated, study_of
 from etc_engine.errors import InputError
@@ -251,7 +251,7 @@ def _of_model(name: str, inputs: Mapping[str, xarray.DataArray]) -> dict[str, fl
     return {item.name: inputs[item.name] for item in find_model(name).inputs if item.name in inputs}
 
 
-def _along(values: xarray.DataArray, known: NDArray[np.bool_], density: NDArray[np.float64]) -> xarray.DataArray:
+def _along(values: xarray.DataArray, known: Flags, density: Floats) -> xarray.DataArray:
     """An input between the densities of the sweep that have a solid fraction."""
     if "density" not in values.dims:
         return values

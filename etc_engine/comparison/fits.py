@@ -9,16 +9,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.comparison.simulation import phases, simulated
 from etc_engine.models.filled_polymers import agari_uno, lewis_nielsen
 from etc_engine.sweep.statistics import student_t
 
 if TYPE_CHECKING:
     import xarray
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.laws import disk, sphere, sphere_dents
 
@@ -53,14 +54,14 @@ class ResistanceLaw:
 
     name: str
     contact: str
-    self_resistances: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]]
-    pipe_resistances: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]]
+    self_resistances: Mapping[str, Callable[[ArrayLike], Floats]]
+    pipe_resistances: Mapping[str, Callable[[ArrayLike], Floats]]
     matrices: Callable[
-        [NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], str, NDArray[np.bool_] | None],
-        NDArray[np.float64],
+        [Ints, Floats, Floats, str, Flags | None],
+        Floats,
     ]
-    moments: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
-    cut: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    moments: Callable[[Floats, Floats], Floats]
+    cut: Callable[[Floats], Floats]
     warming: float
     harmonic: float
     share: float
@@ -114,12 +115,12 @@ def law_of(dimension: int) -> ResistanceLaw:
     return LAWS[dimension]
 
 
-def length_scales(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+def length_scales(radii: Floats, dimension: int) -> Floats:
     """R^(d-2), which multiplies kappa in the resistance of a particle, shape (n,)."""
     return np.asarray(radii ** (dimension - 2))
 
 
-def ball_measure(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+def ball_measure(radii: Floats, dimension: int) -> Floats:
     """Length, area or volume of balls in 1, 2 or 3 dimensions: 2 c, pi c^2, 4/3 pi c^3.
 
     Examples
@@ -130,9 +131,7 @@ def ball_measure(radii: NDArray[np.float64], dimension: int) -> NDArray[np.float
     return np.asarray((2.0, np.pi, 4.0 / 3.0 * np.pi)[dimension - 1] * radii**dimension)
 
 
-def self_resistance(
-    alpha: NDArray[np.float64], radii: NDArray[np.float64], dimension: int, method: str
-) -> NDArray[np.float64]:
+def self_resistance(alpha: Floats, radii: Floats, dimension: int, method: str) -> Floats:
     """Resistance kappa h_ii between a contact and the mean of its particle, dimensionless or, of spheres, [1/m].
 
     Parameters

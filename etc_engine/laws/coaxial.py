@@ -34,7 +34,8 @@ import numpy as np
 from numba import njit
 from numpy.polynomial import chebyshev
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import NDArray
+
+from etc_engine.arrays import Floats
 
 WIDEST = np.sqrt(0.5)
 """sin(b/2) of the widest cap, a hemisphere."""
@@ -43,7 +44,7 @@ Y_TERMS, BETA_TERMS = 16, 8
 
 
 @lru_cache(maxsize=1)
-def coaxial_tables() -> NDArray[np.float64]:
+def coaxial_tables() -> Floats:
     """Chebyshev coefficients of beta (F + ln beta) and beta (D + ln beta), shape (2, Y_TERMS, BETA_TERMS).
 
     Notes
@@ -82,12 +83,12 @@ def _scaled(p: float, beta: float, disk: bool) -> float:
 
 @njit(cache=True)
 def coaxial_column(
-    table: NDArray[np.float64],
-    b: NDArray[np.float64],
+    table: Floats,
+    b: Floats,
     k: int,
     count: int,
-    out: NDArray[np.float64],
-    work: NDArray[np.float64],
+    out: Floats,
+    work: Floats,
 ) -> None:
     """F or D of the first ``count`` caps (or disks) in cap k, by Clenshaw's recurrence in beta, then in y.
 

@@ -20,9 +20,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import zeta
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
 
 _ZETA_3 = 1.2020569031595942
@@ -41,7 +42,7 @@ _ENHANCED_DEGREES = np.array([1.0, 2.5, 5.0, 7.5, 10.0, 12.5, 15.0, 17.5, 20.0])
 _ENHANCED_FACTORS = np.array([0.9799, 0.9762, 0.9729, 0.9707, 0.9693, 0.9682, 0.9675, 0.9672, 0.9671])
 
 
-def position_angles(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+def position_angles(arms: Floats) -> Floats:
     """Position angle of each arm of a disk, shape (s,) [rad], for arms of shape (s, 2).
 
     Examples
@@ -99,9 +100,7 @@ def mutual_resistance_scalar(separation: float, a: float, b: float) -> float:
 
 
 @njit(cache=True)
-def _mutual_resistances(
-    separations: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _mutual_resistances(separations: Floats, a: Floats, b: Floats) -> Floats:
     out = np.empty(separations.size)
     for k in range(separations.size):
         out[k] = mutual_resistance_scalar(separations[k], a[k], b[k])
@@ -109,14 +108,14 @@ def _mutual_resistances(
 
 
 @njit(cache=True)
-def _clausen_values(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _clausen_values(x: Floats) -> Floats:
     out = np.empty(x.size)
     for k in range(x.size):
         out[k] = _reduced_clausen(x[k]) + _ZETA_3
     return out
 
 
-def clausen_c3(x: ArrayLike) -> NDArray[np.float64]:
+def clausen_c3(x: ArrayLike) -> Floats:
     """Sum of cos(kx)/k^3 over k >= 1, to machine precision.
 
     Examples
@@ -128,7 +127,7 @@ def clausen_c3(x: ArrayLike) -> NDArray[np.float64]:
     return _clausen_values(x.ravel()).reshape(x.shape)
 
 
-def mutual_resistance(separation: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayLike) -> NDArray[np.float64]:
+def mutual_resistance(separation: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayLike) -> Floats:
     """Resistance kappa h_ij between two different arcs of a disk, uniform flux on each.
 
     kappa h_ij = 1/pi {ln 2 + [C(D+a-b) + C(D-a+b) - C(D+a+b) - C(D-a-b)] / (4ab)}; for arcs that
@@ -166,7 +165,7 @@ def mutual_resistance(separation: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayL
     return _mutual_resistances(*flat).reshape(separation.shape)
 
 
-def standard_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def standard_resistance(alpha: ArrayLike) -> Floats:
     """Self-resistance kappa h_ii of an arc under uniform flux (method ``standard``).
 
     kappa h_ii = (-ln a + 3/2 + a^2/36 + a^4/2700 + a^6/79380 + ...)/pi, in closed form for any a.
@@ -201,11 +200,11 @@ def standard_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return np.where(two <= np.pi, below, above) / np.pi
 
 
-def _smooth_remainder(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _smooth_remainder(x: Floats) -> Floats:
     return x**4 * np.polynomial.polynomial.polyval(x * x, CLAUSEN_SERIES)
 
 
-def enhanced_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def enhanced_resistance(alpha: ArrayLike) -> Floats:
     """Self-resistance kappa h_ii with the tabulated flux correction (method ``enhanced``).
 
     lambda(alpha) times the uniform-flux value; lambda is linear between the tabulated angles
@@ -234,7 +233,7 @@ def enhanced_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return factor * standard_resistance(alpha)
 
 
-def chord_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def chord_resistance(alpha: ArrayLike) -> Floats:
     """Self-resistance kappa h_ii of a contact chord (method ``chord``).
 
     kappa h_ii = -(1/pi) ln[beta tan(alpha/2)] + 2 kappa h_E,   beta = pi/(2 pi - 2 alpha),
@@ -269,14 +268,14 @@ def chord_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return (-np.log(beta * np.tan(0.5 * alpha)) - 2.0 * mean_ln_cos) / np.pi
 
 
-SELF_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
+SELF_RESISTANCE: Mapping[str, Callable[[ArrayLike], Floats]] = {
     "chord": chord_resistance,
     "standard": standard_resistance,
     "enhanced": enhanced_resistance,
 }
 
 
-def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
+def self_resistance(alpha: ArrayLike, method: str) -> Floats:
     """Self-resistance kappa h_ii by the named method: ``chord``, ``standard`` or ``enhanced``.
 
     Raises
@@ -295,12 +294,12 @@ def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
 
 
 def resistance_matrices(
-    offsets: NDArray[np.int64],
-    arms: NDArray[np.float64],
-    alpha: NDArray[np.float64],
+    offsets: Ints,
+    arms: Floats,
+    alpha: Floats,
     method: str,
-    cutting: NDArray[np.bool_] | None = None,  # noqa: ARG001  (the interface of both laws)
-) -> NDArray[np.float64]:
+    cutting: Flags | None = None,  # noqa: ARG001  (the interface of both laws)
+) -> Floats:
     """Resistance matrices kappa H of many disks, packed row by row one after the other.
 
     Parameters
@@ -333,12 +332,12 @@ def resistance_matrices(
 
 @njit(cache=True)
 def _matrices(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    own: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    offsets: Ints,
+    starts: Ints,
+    theta: Floats,
+    alpha: Floats,
+    own: Floats,
+) -> Floats:
     values = np.empty(starts[-1])
     for p in range(offsets.size - 1):
         o, s, n = offsets[p], starts[p], offsets[p + 1] - offsets[p]
@@ -351,12 +350,12 @@ def _matrices(
     return values
 
 
-def first_moments(arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_moments(arms: Floats, alpha: Floats) -> Floats:
     """Mean unit direction over each arc, n sin(alpha)/alpha, shape (s, 2)."""
     theta = np.arctan2(arms[:, 1], arms[:, 0])
     return np.sinc(alpha / np.pi)[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
 
 
-def segment_area(alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+def segment_area(alpha: Floats) -> Floats:
     """Area behind a chord of half-angle alpha, alpha - sin alpha cos alpha, of the unit disk."""
     return np.asarray(alpha - np.sin(alpha) * np.cos(alpha))

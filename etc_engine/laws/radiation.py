@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """W/(m2 K4) (CODATA 2018)."""
 
 
-def grey_exchange(temperature: float, emissivity_1: ArrayLike, emissivity_2: ArrayLike) -> NDArray[np.float64]:
+def grey_exchange(temperature: float, emissivity_1: ArrayLike, emissivity_2: ArrayLike) -> Floats:
     r"""Conductance per area of two parallel grey surfaces at a mean temperature [W/(m2 K)].
 
     .. math:: h_r = \frac{4 \sigma T^3}{1/e_1 + 1/e_2 - 1}

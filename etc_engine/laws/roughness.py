@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 FOUR_PI = 4.0 * math.pi
@@ -59,7 +60,7 @@ _CHEBYSHEV = np.concatenate(
 )
 
 
-def neumann(cosine: ArrayLike) -> NDArray[np.float64]:
+def neumann(cosine: ArrayLike) -> Floats:
     """Temperature kappa R N at the surface of a ball, at an angle from a unit point source on it.
 
     4 pi N = 1/s - 2 - ln(s + s^2), s = sin(gamma/2), for a sink at the centre; T_o is 0.
@@ -83,7 +84,7 @@ def neumann(cosine: ArrayLike) -> NDArray[np.float64]:
     return np.asarray((1.0 / s - 2.0 - np.log(s + s * s)) / FOUR_PI)
 
 
-def standard_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def standard_resistance(alpha: ArrayLike) -> Floats:
     """Self-resistance kappa R h_ii of a cap under uniform flux (method ``standard``).
 
     4 pi kappa R h_ii = sum_{l>=1} (2l+1)/l A_l^2, A_l = (P_{l-1} - P_{l+1})(cos a)/((2l+1)(1 - cos a)): the small-angle
@@ -109,7 +110,7 @@ def standard_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(8.0 / (3.0 * np.pi**2 * alpha) - np.log(alpha) / FOUR_PI + smooth)
 
 
-def disk_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def disk_resistance(alpha: ArrayLike) -> Floats:
     """Self-resistance kappa R h_ii of a flat disk with the density 1/sqrt(c^2 - rho^2) inside the full ball.
 
     4 pi kappa R h_ii = pi/(2 sin a) - 2a/sin a + 2 - ln(2 sin a) + (pi/2 - a) cot a;
@@ -136,7 +137,7 @@ def disk_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(value / FOUR_PI)
 
 
-def chord_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def chord_resistance(alpha: ArrayLike) -> Floats:
     """Self-resistance kappa R h_ii of the sphere cut at an isothermal contact disk (method ``chord``).
 
     h_ii = h_disk - (a/cos a) sum_k c_k T_k. Exact for one disk and a sink at the centre.
@@ -168,13 +169,13 @@ def chord_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(disk_resistance(alpha) - alpha / np.cos(alpha) * series)
 
 
-SELF_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
+SELF_RESISTANCE: Mapping[str, Callable[[ArrayLike], Floats]] = {
     "chord": chord_resistance,
     "standard": standard_resistance,
 }
 
 
-def holm_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def holm_resistance(alpha: ArrayLike) -> Floats:
     """Resistance kappa R h = 1/(4 sin alpha) of an isothermal disk on a half-space (pipe method ``holm``).
 
     Two of them in series conduct 2 kappa c, c = R sin alpha. The limit of `chord_resistance` for small contacts.
@@ -191,7 +192,7 @@ def holm_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(0.25 / np.sin(np.asarray(alpha, dtype=np.float64)))
 
 
-def root_area_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
+def root_area_resistance(alpha: ArrayLike) -> Floats:
     """Resistance kappa R h = 1/(4 sqrt(pi) sin alpha) of the conductance 4 k_1 k_2/(k_1 + k_2) sqrt(A) of DEM codes.
 
     A = pi c^2 is the area of the contact. It is there to reproduce such codes: it conducts sqrt(pi) = 1.77 times as
@@ -204,7 +205,7 @@ def root_area_resistance(alpha: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(holm_resistance(alpha) / np.sqrt(np.pi))
 
 
-PIPE_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
+PIPE_RESISTANCE: Mapping[str, Callable[[ArrayLike], Floats]] = {
     **SELF_RESISTANCE,
     "holm": holm_resistance,
     "root-area": root_area_resistance,
@@ -212,7 +213,7 @@ PIPE_RESISTANCE: Mapping[str, Callable[[ArrayLike], NDArray[np.float64]]] = {
 """Self-resistances for which no mutual ones exist are for the pipe network alone."""
 
 
-def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
+def self_resistance(alpha: ArrayLike, method: str) -> Floats:
     """Self-resistance kappa R h_ii by the named method, ``chord`` or ``standard``.
 
     Raises
@@ -225,9 +226,7 @@ def self_resistance(alpha: ArrayLike, method: str) -> NDArray[np.float64]:
     return SELF_RESISTANCE[method](alpha)
 
 
-def mutual_resistance(
-    cosine: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayLike, method: str = "chord"
-) -> NDArray[np.float64]:
+def mutual_resistance(cosine: ArrayLike, alpha_i: ArrayLike, alpha_j: ArrayLike, method: str = "chord") -> Floats:
     """Resistance kappa R h_ij between two different contacts of a sphere.
 
     The mean of the ball's Neumann function over the flux densities of both contacts. An equilibrium disk (``chord``)
@@ -262,7 +261,7 @@ def mutual_resistance(
     return _mutual(cosine.ravel(), a, b, method == "standard").reshape(cosine.shape)
 
 
-def first_moments(arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_moments(arms: Floats, alpha: Floats) -> Floats:
     """First harmonic of an equilibrium disk, n (1 + 2 cos alpha)/3, shape (s, 3); of a cap nearly the same."""
     unit = arms / np.linalg.norm(arms, axis=1, keepdims=True)
     return np.asarray(unit * ((1.0 + 2.0 * np.cos(alpha)) / 3.0)[:, None])
@@ -336,9 +335,7 @@ def _cap_density(t: float, a: float) -> float:
 
 
 @njit(cache=True)
-def _mutual(
-    cosine: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64], uniform: bool
-) -> NDArray[np.float64]:
+def _mutual(cosine: Floats, a: Floats, b: Floats, uniform: bool) -> Floats:
     out = np.empty(cosine.size)
     for k in range(cosine.size):
         out[k] = mutual_of_caps(cosine[k], a[k], b[k]) if uniform else mutual_of_disks(cosine[k], a[k], b[k])

@@ -13,23 +13,23 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.laws.sphere import FOUR_PI, mutual_of_caps, mutual_of_disks, self_resistance
 
 
-def cap_volume(alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+def cap_volume(alpha: Floats) -> Floats:
     """Volume behind a contact disk of half-angle alpha, pi (1 - cos alpha)^2 (2 + cos alpha)/3, of the unit sphere."""
     return np.asarray(np.pi / 3.0 * (2.0 * np.sin(0.5 * alpha) ** 2) ** 2 * (2.0 + np.cos(alpha)))
 
 
 def resistance_matrices(
-    offsets: NDArray[np.int64],
-    arms: NDArray[np.float64],
-    alpha: NDArray[np.float64],
+    offsets: Ints,
+    arms: Floats,
+    alpha: Floats,
     method: str,
-    cutting: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+    cutting: Flags | None = None,
+) -> Floats:
     """Resistance matrices kappa R H of many spheres, packed row by row one after the other.
 
     Method ``chord`` adds the dents sum_j V_j g_jk . g_jl (R = 1): the caps that other contacts cut away carry no
@@ -75,14 +75,14 @@ def resistance_matrices(
 
 @njit(cache=True, error_model="numpy")
 def _matrices(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    own: NDArray[np.float64],
-    volumes: NDArray[np.float64],
+    offsets: Ints,
+    starts: Ints,
+    normals: Floats,
+    alpha: Floats,
+    own: Floats,
+    volumes: Floats,
     uniform: bool,
-) -> NDArray[np.float64]:
+) -> Floats:
     """H_kl, and its dents sum_j V_j g_jk . g_jl for disks, of all spheres."""
     values = np.empty(starts[-1])
     widest = 0
@@ -116,9 +116,7 @@ def neumann_slope(cosine: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _add_dent(
-    h: NDArray[np.float64], normals: NDArray[np.float64], j: int, volume: float, gradient: NDArray[np.float64]
-) -> None:
+def _add_dent(h: Floats, normals: Floats, j: int, volume: float, gradient: Floats) -> None:
     """H_kl += V_j g_jk . g_jl with g_jk = N'(cos gamma_jk) (n_k - cos gamma_jk n_j), g_jj = 0."""
     n = len(normals)
     for k in range(n):

@@ -19,8 +19,8 @@ import math
 import numpy as np
 from numba import njit
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.laws.sphere import FOUR_PI
 
 _POINTS = 24
@@ -28,14 +28,14 @@ _NODES, _WEIGHTS = 0.5 * (leggauss(_POINTS)[0] + 1.0), 0.5 * leggauss(_POINTS)[1
 
 
 def sphere_temperatures(
-    spheres: NDArray[np.int64],
-    points: NDArray[np.float64],
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    flows: NDArray[np.float64],
+    spheres: Ints,
+    points: Floats,
+    offsets: Ints,
+    normals: Floats,
+    alpha: Floats,
+    flows: Floats,
     method: str,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Temperature above the mean of its sphere at points inside spheres.
 
     Parameters
@@ -84,14 +84,14 @@ def sphere_temperatures(
 
 @njit(cache=True)
 def _temperatures(
-    spheres: NDArray[np.int64],
-    points: NDArray[np.float64],
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    flows: NDArray[np.float64],
+    spheres: Ints,
+    points: Floats,
+    offsets: Ints,
+    normals: Floats,
+    alpha: Floats,
+    flows: Floats,
     uniform: bool,
-) -> NDArray[np.float64]:
+) -> Floats:
     out = np.empty(spheres.size)
     for q in range(spheres.size):
         r = math.sqrt(points[q, 0] ** 2 + points[q, 1] ** 2 + points[q, 2] ** 2)

@@ -34,6 +34,7 @@ from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 from scipy.special import binom, eval_gegenbauer, eval_jacobi, factorial, gamma
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.laws.sphere import FOUR_PI, chord_resistance
 
 WIDEST = np.radians(80.0)
@@ -61,12 +62,12 @@ class ModeTables(NamedTuple):
         <s, 1/|x|>/(4 pi), by which T_o is the temperature of the centre.
     """
 
-    orders: NDArray[np.int64]
-    radials: NDArray[np.int64]
-    lines: NDArray[np.float64]
-    selves: NDArray[np.float64]
-    caps: NDArray[np.float64]
-    gauges: NDArray[np.float64]
+    orders: Ints
+    radials: Ints
+    lines: Floats
+    selves: Floats
+    caps: Floats
+    gauges: Floats
 
 
 def number_of_modes(degree: int) -> int:
@@ -103,12 +104,12 @@ def mode_tables(degree: int) -> ModeTables:
 class OwnBlocks(NamedTuple):
     """What belongs to single contacts: V_ii and L, shape (s, f, f), and the gauge, shape (s, f)."""
 
-    selves: NDArray[np.float64]
-    caps: NDArray[np.float64]
-    gauges: NDArray[np.float64]
+    selves: Floats
+    caps: Floats
+    gauges: Floats
 
 
-def own_blocks(tables: ModeTables, alpha: NDArray[np.float64]) -> OwnBlocks:
+def own_blocks(tables: ModeTables, alpha: Floats) -> OwnBlocks:
     """V_ii, L and gauge of contacts of half-angles alpha up to `WIDEST`, by family."""
     x = 2.0 * alpha / WIDEST - 1.0
     c = np.sin(alpha)[:, None, None]
@@ -152,9 +153,7 @@ def neumann_derivatives(u: complex, v: complex, w: complex, out: NDArray[np.comp
 
 
 @njit(cache=True, error_model="numpy")
-def pair_means(
-    cosine: float, a: float, b: float, orders: NDArray[np.int64], lines: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
+def pair_means(cosine: float, a: float, b: float, orders: Ints, lines: Floats, out: Floats) -> None:
     """Means of the derivatives of N over the lines of two contacts, for each pair of families (f, g) and r.
 
     out[f, g, r] = c_a^p c_b^q Re int int w_f w_g zeta'^(p-r) zeta^(q-r) N^(p+q-r) dy dy',  p, q the orders of f and g.
@@ -191,9 +190,7 @@ def pair_means(
 
 
 @njit(cache=True)
-def combine(
-    means: NDArray[np.float64], p: int, q: int, dots: tuple[complex, complex, complex, complex]
-) -> tuple[complex, complex]:
+def combine(means: Floats, p: int, q: int, dots: tuple[complex, complex, complex, complex]) -> tuple[complex, complex]:
     """<s, V s'> of two modes along E and F, and along E and F*, times 4 pi.
 
     sum_r p! q!/((p-r)! (q-r)! r!) (E . n')^(p-r) (F . n)^(q-r) (E . F)^r means_r; ``dots`` are E . n', F . n, E . F and
@@ -219,7 +216,7 @@ def _half(m: int) -> float:
     return 1.0 if m == 0 else 0.5
 
 
-def _line(m: int, k: int, y: NDArray[np.float64]) -> NDArray[np.float64]:
+def _line(m: int, k: int, y: Floats) -> Floats:
     """w_mk with y^m times its Fourier transform the spherical Bessel function (-1)^k j_(m+2k); 1/2 for m = k = 0."""
     n, nu = 2 * k, m + 0.5
     scale = np.pi * 2.0 ** (1.0 - nu) * gamma(n + 2.0 * nu) / (factorial(n) * gamma(nu)) * np.sqrt(2.0 / np.pi)
@@ -234,7 +231,7 @@ def _dual_scale(m: int, k: int) -> float:
     return float((-1.0) ** k / (binom(2 * k + m - 0.5, k) * moment))
 
 
-def _self_block(families: list[tuple[int, int]], a: float) -> NDArray[np.float64]:
+def _self_block(families: list[tuple[int, int]], a: float) -> Floats:
     """V_ii times c: 1/(4 pi |x - x'|) in closed form, diagonal, and its image.
 
     The image needs int int w(y) w'(y') D^-j dy dy', D = 1 - zeta zeta': by parts over y', w' being a polynomial, and
@@ -259,7 +256,7 @@ def _self_block(families: list[tuple[int, int]], a: float) -> NDArray[np.float64
     return out
 
 
-def _gauge(families: list[tuple[int, int]], a: float) -> NDArray[np.float64]:
+def _gauge(families: list[tuple[int, int]], a: float) -> Floats:
     """Mean of 1/(4 pi zeta) over each line; of the derivatives it is zero."""
     y, weight = leggauss(48)
     heights = math.cos(a) + 1j * math.sin(a) * y
@@ -272,15 +269,15 @@ def _line_polynomial(m: int, k: int) -> np.polynomial.Polynomial:
     return np.polynomial.Polynomial.fit(nodes, _line(m, k, nodes), 2 * (m + k), domain=[-1.0, 1.0])
 
 
-def _image_powers(top: int) -> list[NDArray[np.float64]]:
+def _image_powers(top: int) -> list[Floats]:
     """Derivatives 0 .. top of 1/D - ln((1 - w + D)/2), D^2 = 1 - 2w + t^2, at w = t by powers of 1/D; no ln D."""
     polynomial, log = np.polynomial.polynomial, [np.zeros(1)]
-    ratio: list[NDArray[np.float64]] = [np.ones(1)]
+    ratio: list[Floats] = [np.ones(1)]
     root = 1.0
     for k in range(1, top + 1):  # sqrt(1 - 2e/D^2) = sum root_k (e/D^2)^k; 1 - w + D over its value 2D
         root *= (2.0 * k - 3.0) / k
         ratio.append(0.5 * root * np.eye(2 * k + 1)[2 * k] - 0.5 * (k == 1) * np.eye(2 * k + 1)[1])
-        mixed: NDArray[np.float64] = ratio[k]
+        mixed: Floats = ratio[k]
         for j in range(1, k):
             mixed = np.asarray(polynomial.polysub(mixed, polynomial.polymul(log[j], ratio[k - j]) * j / k))
         log.append(mixed)
@@ -289,7 +286,7 @@ def _image_powers(top: int) -> list[NDArray[np.float64]]:
 
 
 def _by_parts(
-    line: np.polynomial.Polynomial, m: int, powers: NDArray[np.float64], zeta: NDArray[np.complex128], a: float
+    line: np.polynomial.Polynomial, m: int, powers: Floats, zeta: NDArray[np.complex128], a: float
 ) -> NDArray[np.complex128]:
     """Integral over y' of line(y') [sum_j powers_j D^-j - (ln D if m = 0)], D = 1 - zeta (cos a + i y' sin a)."""
     step = 1j / (zeta * math.sin(a))  # dy'/dD
@@ -316,7 +313,7 @@ def _harmonic(n: int) -> float:
     return sum(1.0 / i for i in range(1, n + 1))
 
 
-def _cap_block(families: list[tuple[int, int]], a: float) -> NDArray[np.float64]:
+def _cap_block(families: list[tuple[int, int]], a: float) -> Floats:
     """L/c^2: the least energy in the cap behind a disk with the temperatures t on it, by polynomials."""
     c, deep = math.sin(a), 2.0 * math.sin(0.5 * a) ** 2
     x, w = leggauss(24)
@@ -350,12 +347,12 @@ def _cap_block(families: list[tuple[int, int]], a: float) -> NDArray[np.float64]
 
 
 def _gradient(
-    value: NDArray[np.float64],
-    radial: NDArray[np.float64],
-    axial: NDArray[np.float64],
-    turns: NDArray[np.float64],
+    value: Floats,
+    radial: Floats,
+    axial: Floats,
+    turns: Floats,
     shape: tuple[int, ...] | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     """(d/drho, d/dz, m/rho) of a function at all points."""
     parts = np.broadcast_arrays(radial, axial, turns * value)
     return np.array([np.broadcast_to(part, shape or part.shape) for part in parts])

@@ -12,8 +12,8 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 GAS_CONSTANT = 8.31446261815324
@@ -296,7 +296,7 @@ def _mixture(fractions: Mapping[str, float], temperature: float, pressure: float
     )
 
 
-def interaction_factors(viscosity: NDArray[np.float64], molar_mass: NDArray[np.float64]) -> NDArray[np.float64]:
+def interaction_factors(viscosity: Floats, molar_mass: Floats) -> Floats:
     r"""Wilke's factors, which Mason and Saxena use for conductivity as well.
 
     .. math:: \phi_{ij} = \frac{[1 + (\mu_i/\mu_j)^{1/2} (M_j/M_i)^{1/4}]^2}{[8 (1 + M_i/M_j)]^{1/2}}
@@ -315,7 +315,7 @@ def interaction_factors(viscosity: NDArray[np.float64], molar_mass: NDArray[np.f
     return (1.0 + np.sqrt(mu) * m**-0.25) ** 2 / np.sqrt(8.0 * (1.0 + m))
 
 
-def mixture_value(x: NDArray[np.float64], values: NDArray[np.float64], factors: NDArray[np.float64]) -> float:
+def mixture_value(x: Floats, values: Floats, factors: Floats) -> float:
     """Mean sum_i x_i v_i / sum_j x_j phi_ij of a property of a gas mixture.
 
     Examples

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from etc_engine.materials.properties import Floats, Property, polynomial, table
+from etc_engine.arrays import Floats
+from etc_engine.materials.properties import Property, polynomial, table
 from etc_engine.materials.solid import W_MK, Solid
 
 CELSIUS = 273.15

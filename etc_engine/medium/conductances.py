@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from etc_engine.arrays import Floats
 from etc_engine.laws.by_dimension import self_resistance
 from etc_engine.medium.conductivity import affine_conductivity
 from etc_engine.medium.medium import Medium, check_conductors
 from etc_engine.medium.sides import check_arcs, contact_sides
 
 
-def contact_conductances(medium: Medium, law: str = "chord") -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def contact_conductances(medium: Medium, law: str = "chord") -> tuple[Floats, Floats]:
     """Conductances of the contacts of a medium as resistances in series.
 
     C = 1/(h_ii/kappa_i + h_jj/kappa_j + R_c) between two particles, C = 1/(h_ii/kappa_i + R_c) at a wall.

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import AXES, Box
 from etc_engine.errors import ConvergenceError
 from etc_engine.medium.backbone import Backbone
@@ -31,7 +31,7 @@ class LoadSolution(Protocol):
         """What takes part."""
 
     @property
-    def energies(self) -> NDArray[np.float64]:
+    def energies(self) -> Floats:
         """Energy of every pair of loads, shape (k, k)."""
 
     @property
@@ -75,14 +75,14 @@ class EffectiveConductivity(Generic[Solution]):
     seconds : float
     """
 
-    tensor: NDArray[np.float64]
+    tensor: Floats
     spans: tuple[bool | None, ...]
     unknowns: int
     iterations: int
     relative_energy_error: float
     solutions: tuple[Solution, ...] = ()
     model_error: float = np.nan
-    bounds: NDArray[np.float64] | None = None
+    bounds: Floats | None = None
     solid_fraction: float = np.nan
     snapshots: int = 0
     certified: bool = False
@@ -99,7 +99,7 @@ class EffectiveConductivity(Generic[Solution]):
         return float(np.nanmean(np.diag(self.tensor)))
 
 
-def conductivities(box: Box, axes: Sequence[int], energies: NDArray[np.float64]) -> NDArray[np.float64]:
+def conductivities(box: Box, axes: Sequence[int], energies: Floats) -> Floats:
     """Conductivity tensor of a group of load axes from the energies of its loads, shape (k, k) [W/(m K)].
 
     Parameters
@@ -170,7 +170,7 @@ def check_balance(heat_in: float, heat_out: float, energy: float) -> None:
         )
 
 
-def affine_conductivity(box: Box, branches: NDArray[np.float64], conductances: NDArray[np.float64]) -> float:
+def affine_conductivity(box: Box, branches: Floats, conductances: Floats) -> float:
     """Mean conductivity over the axes of a network of links whose nodes all follow the mean gradient.
 
     k = 1/(d V) sum_c C_c |b_c|^2, an upper bound of the network in a periodic box.

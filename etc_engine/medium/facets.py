@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.laguerre import laguerre_facets, refuse_hidden
@@ -39,16 +39,16 @@ class FacetLinks:
     """
 
     packing: ParticlePacking
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    areas: NDArray[np.float64]
-    wall_particles: NDArray[np.int64]
-    walls: NDArray[np.int64]
-    wall_areas: NDArray[np.float64]
-    wall_distances: NDArray[np.float64]
-    contacts: NDArray[np.float64]
-    bonds: NDArray[np.float64]
-    volumes: NDArray[np.float64]
+    pairs: Ints
+    shifts: Ints
+    areas: Floats
+    wall_particles: Ints
+    walls: Ints
+    wall_areas: Floats
+    wall_distances: Floats
+    contacts: Floats
+    bonds: Floats
+    volumes: Floats
 
     @property
     def count(self) -> int:
@@ -61,24 +61,24 @@ class FacetLinks:
         return int(np.count_nonzero(self.contacts[: self.count]))
 
     @cached_property
-    def branches(self) -> NDArray[np.float64]:
+    def branches(self) -> Floats:
         """Branch vectors from the centre of i to that of the image of j, shape (m, 3) [m]."""
         centers, lengths = self.packing.centers, np.asarray(self.packing.box.lengths)
         return centers[self.pairs[:, 1]] - centers[self.pairs[:, 0]] + self.shifts * lengths
 
     @cached_property
-    def lengths(self) -> NDArray[np.float64]:
+    def lengths(self) -> Floats:
         """Distance of the two centres, and of the centre from the wall, shape (m + w,) [m]."""
         return np.concatenate([np.linalg.norm(self.branches, axis=1), self.wall_distances])
 
     @cached_property
-    def smaller_radii(self) -> NDArray[np.float64]:
+    def smaller_radii(self) -> Floats:
         """Radius of the smaller sphere of each link, shape (m + w,) [m]."""
         radii = self.packing.radii
         return np.concatenate([radii[self.pairs].min(axis=1, initial=np.inf), radii[self.wall_particles]])
 
     @cached_property
-    def overlap_of_caps(self) -> NDArray[np.float64]:
+    def overlap_of_caps(self) -> Floats:
         r"""S = sum_j n_j n_j^T (1 - cos^3 psi_j)/2 of every sphere, shape (n, 3, 3).
 
         The caps have the areas of the facets, seen along the line of centres. If they tiled the sphere, S would be I.
@@ -99,7 +99,7 @@ class FacetLinks:
         return overlap
 
     @cached_property
-    def wall_normals(self) -> NDArray[np.float64]:
+    def wall_normals(self) -> Floats:
         """Unit vectors from the sphere to its wall, shape (w, 3)."""
         normals = np.zeros((self.walls.size, 3))
         normals[np.arange(self.walls.size), self.walls // 2] = 2.0 * (self.walls % 2) - 1.0
@@ -199,14 +199,14 @@ def links_network(links: FacetLinks, rule: str) -> ContactNetwork:
     )
 
 
-def _pair_keys(pairs: NDArray[np.int64], shifts: NDArray[np.int64]) -> NDArray[np.int64]:
+def _pair_keys(pairs: Ints, shifts: Ints) -> Ints:
     """Rows (i, j, shift), with the first non-zero shift of a sphere's own image positive."""
     leading = np.where(shifts[:, 0] != 0, shifts[:, 0], np.where(shifts[:, 1] != 0, shifts[:, 1], shifts[:, 2]))
     turned = (pairs[:, 0] == pairs[:, 1]) & (leading < 0)
     return np.column_stack([pairs, np.where(turned[:, None], -shifts, shifts)])
 
 
-def _find(rows: NDArray[np.int64], wanted: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _find(rows: Ints, wanted: Ints) -> tuple[Ints, Flags]:
     """Where each wanted row stands among the rows, and which ones stand nowhere; the former without the latter."""
     both = np.concatenate([rows, wanted])
     low = both.min(axis=0, initial=0)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from etc_engine.arrays import Floats, Ints
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.sides import ContactSides
 
-Inside = Callable[[NDArray[np.int64], NDArray[np.float64]], NDArray[np.float64]]
+Inside = Callable[[Ints, Floats], Floats]
 """(particle of each point, position relative to its centre [m]) -> temperature [K]."""
 
 
@@ -52,12 +50,12 @@ class ParticleField:
     medium: Medium
     axis: int
     sides: ContactSides
-    particle_temperatures: NDArray[np.float64]
-    contact_temperatures: NDArray[np.float64]
-    wall_temperatures: NDArray[np.float64]
-    contact_flows: NDArray[np.float64]
-    wall_flows: NDArray[np.float64]
-    face_temperatures: NDArray[np.float64]
-    flow_modes: NDArray[np.float64]
+    particle_temperatures: Floats
+    contact_temperatures: Floats
+    wall_temperatures: Floats
+    contact_flows: Floats
+    wall_flows: Floats
+    face_temperatures: Floats
+    flow_modes: Floats
     inside: Inside | None = None
-    reach: NDArray[np.float64] | None = None
+    reach: Floats | None = None

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.contact import Elastic, effective_modulus, effective_radius, radius_from_area, reach_from_force
 from etc_engine.medium.network import ContactNetwork
@@ -15,7 +15,7 @@ RULE = "given"
 WIDTHS = ("area", "force")
 
 
-def given_contacts(packing: ParticlePacking, rows: NDArray[np.int64], reach: NDArray[np.float64]) -> ContactNetwork:
+def given_contacts(packing: ParticlePacking, rows: Ints, reach: Floats) -> ContactNetwork:
     r"""Contacts between given particles, of given half-width.
 
     .. math:: \sin\alpha_i = c / R_i
@@ -77,12 +77,12 @@ def given_contacts(packing: ParticlePacking, rows: NDArray[np.int64], reach: NDA
 
 def reach_of_contacts(
     packing: ParticlePacking,
-    rows: NDArray[np.int64],
+    rows: Ints,
     *,
-    area: NDArray[np.float64] | None = None,
-    force: NDArray[np.float64] | None = None,
+    area: Floats | None = None,
+    force: Floats | None = None,
     material: Elastic | None = None,
-) -> NDArray[np.float64]:
+) -> Floats:
     r"""Half-width of contacts from their area or their force.
 
     :math:`c = \sqrt{A/\pi}` from the area, or the Hertzian width of the true material under the normal force.

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.sparse import coo_matrix, csr_matrix, diags_array
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.medium.backbone import Backbone, find_backbone
 from etc_engine.medium.loads import Links, driven_walls, first_of_clusters, link_loads
 from etc_engine.solvers import SolveReport, build_preconditioner, solve_loads
@@ -51,12 +51,12 @@ class LinkSolution:
     """
 
     axes: tuple[int, ...]
-    walls: NDArray[np.int64]
+    walls: Ints
     backbone: Backbone
-    temperatures: NDArray[np.float64]
-    flows: NDArray[np.float64]
-    wall_flows: NDArray[np.float64]
-    energies: NDArray[np.float64]
+    temperatures: Floats
+    flows: Floats
+    wall_flows: Floats
+    energies: Floats
     reports: tuple[SolveReport, ...]
 
     def wall_heat(self) -> tuple[float, float]:
@@ -68,8 +68,8 @@ class LinkSolution:
 def solve_links(
     links: Links,
     axes: tuple[int, ...],
-    conductances: NDArray[np.float64],
-    wall_conductances: NDArray[np.float64],
+    conductances: Floats,
+    wall_conductances: Floats,
     *,
     tolerance: float = 1e-10,
     backbone: Backbone | None = None,
@@ -138,9 +138,7 @@ def solve_links(
     return LinkSolution(axes, links.walls, backbone, temperatures, flows, wall_flows, energies, reports)
 
 
-def _warm_lone_particles(
-    links: Links, axes: tuple[int, ...], temperatures: NDArray[np.float64], conducts: NDArray[np.bool_]
-) -> None:
+def _warm_lone_particles(links: Links, axes: tuple[int, ...], temperatures: Floats, conducts: Flags) -> None:
     """Particles off the backbone that touch a driven wall take its temperature, in place."""
     alone = np.flatnonzero(driven_walls(links, axes) & conducts)
     alone = alone[np.isnan(temperatures[links.wall_particles[alone], 0])]
@@ -149,10 +147,10 @@ def _warm_lone_particles(
 
 def laplacian(
     n: int,
-    pairs: NDArray[np.int64],
-    conductances: NDArray[np.float64],
-    linked: NDArray[np.int64],
-    ties: NDArray[np.float64],
+    pairs: Ints,
+    conductances: Floats,
+    linked: Ints,
+    ties: Floats,
 ) -> csr_matrix:
     """Graph Laplacian of n nodes, shape (n, n): links between them, and ties to prescribed temperatures.
 
@@ -185,10 +183,10 @@ def laplacian(
 
 
 def fill_dead_ends(
-    temperatures: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    offsets: NDArray[np.float64],
-    rises: NDArray[np.float64] | None = None,
+    temperatures: Floats,
+    pairs: Ints,
+    offsets: Floats,
+    rises: Floats | None = None,
 ) -> None:
     """Carry known temperatures, in place, to the particles without flux (NaN) that hang on them.
 
@@ -208,10 +206,10 @@ def fill_dead_ends(
 
 @njit(cache=True)
 def _fill(
-    temperatures: NDArray[np.float64],
-    pairs: NDArray[np.int64],
-    offsets: NDArray[np.float64],
-    rises: NDArray[np.float64],
+    temperatures: Floats,
+    pairs: Ints,
+    offsets: Floats,
+    rises: Floats,
 ) -> None:
     """Breadth first over the links: T_other = T_p + rise at the link on p, less the offset of the image."""
     n, m = temperatures.size, pairs.shape[0]

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.contact import (
     effective_radius,
@@ -31,8 +32,6 @@ from etc_engine.medium.touching import (
 )
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import AXES, Box
 from etc_engine.errors import InputError
 from etc_engine.medium.sides import ContactSides
@@ -24,15 +24,15 @@ class Links(Protocol):
     @property
     def packing(self) -> ParticlePacking: ...  # noqa: D102
     @property
-    def pairs(self) -> NDArray[np.int64]: ...  # noqa: D102
+    def pairs(self) -> Ints: ...  # noqa: D102
     @property
-    def shifts(self) -> NDArray[np.int64]: ...  # noqa: D102
+    def shifts(self) -> Ints: ...  # noqa: D102
     @property
-    def branches(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def branches(self) -> Floats: ...  # noqa: D102
     @property
-    def wall_particles(self) -> NDArray[np.int64]: ...  # noqa: D102
+    def wall_particles(self) -> Ints: ...  # noqa: D102
     @property
-    def walls(self) -> NDArray[np.int64]: ...  # noqa: D102
+    def walls(self) -> Ints: ...  # noqa: D102
 
 
 def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
@@ -66,12 +66,12 @@ def asked_groups(box: Box, axes: tuple[int, ...] | None) -> tuple[tuple[int, ...
     return tuple(group for group in groups if set(group) & set(axes))
 
 
-def driven_walls(links: Links, axes: tuple[int, ...]) -> NDArray[np.bool_]:
+def driven_walls(links: Links, axes: tuple[int, ...]) -> Flags:
     """Wall links whose wall has a prescribed temperature, shape (w,)."""
     return np.asarray((links.walls // 2 == axes[0]) & (not links.packing.box.periodic[axes[0]]))
 
 
-def wall_temperatures(walls: NDArray[np.int64]) -> NDArray[np.float64]:
+def wall_temperatures(walls: Ints) -> Floats:
     """Temperature of driven walls: 1 at the low end of the axis, 0 at the far end [K]."""
     return np.asarray(1.0 - walls % 2)
 
@@ -90,9 +90,9 @@ class LinkLoads:
         Prescribed temperatures at the driven walls, 0 elsewhere.
     """
 
-    jumps: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    walls: NDArray[np.float64]
+    jumps: Floats
+    offsets: Floats
+    walls: Floats
 
 
 def link_loads(links: Links, axes: tuple[int, ...]) -> LinkLoads:
@@ -106,14 +106,14 @@ def link_loads(links: Links, axes: tuple[int, ...]) -> LinkLoads:
     return LinkLoads(none, none, walls)
 
 
-def first_of_clusters(labels: NDArray[np.int64]) -> NDArray[np.int64]:
+def first_of_clusters(labels: Ints) -> Ints:
     """Row of the first member of each cluster: the node that is pinned under mean gradients."""
     return np.unique(labels, return_index=True)[1]
 
 
 def contact_lift(
-    reduced: Links, axes: tuple[int, ...], clusters: NDArray[np.int64], sides: ContactSides, modes: int
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    reduced: Links, axes: tuple[int, ...], clusters: Ints, sides: ContactSides, modes: int
+) -> tuple[Floats, Flags]:
     """Lift and prescribed nodes of a system whose nodes are the contacts, each of several flux modes.
 
     The walls of a walled axis are prescribed, and one contact of each cluster along periodic axes, whose lift are the

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.medium.network import LARGEST, ContactNetwork
@@ -103,10 +104,10 @@ class Medium:
     """
 
     packing: ParticlePacking
-    conductivity: NDArray[np.float64]
+    conductivity: Floats
     network: ContactNetwork | None = None
     pores: Pores = VACUUM
-    heat_capacity: NDArray[np.float64] | None = None
+    heat_capacity: Floats | None = None
 
     def __post_init__(self) -> None:
         n = self.packing.count
@@ -196,7 +197,7 @@ def check_conductors(medium: Medium) -> None:
         raise InputError(f"the conductivity must be positive and finite, found {found:g}")
 
 
-def per_particle(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
+def per_particle(values: ArrayLike, count: int, name: str) -> Floats:
     """One value for all particles, or one for each, as an array of shape (count,), which may be read only.
 
     Raises

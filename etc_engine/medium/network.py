@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.laws.by_dimension import ball_measure, law_of
 from etc_engine.packing.particles import ParticlePacking
@@ -50,14 +51,14 @@ class ContactNetwork:
     """
 
     packing: ParticlePacking
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    angles: NDArray[np.float64]
-    resistances: NDArray[np.float64]
-    wall_particles: NDArray[np.int64]
-    walls: NDArray[np.int64]
-    wall_angles: NDArray[np.float64]
-    wall_resistances: NDArray[np.float64]
+    pairs: Ints
+    shifts: Ints
+    angles: Floats
+    resistances: Floats
+    wall_particles: Ints
+    walls: Ints
+    wall_angles: Floats
+    wall_resistances: Floats
     rule: str
 
     @property
@@ -76,13 +77,13 @@ class ContactNetwork:
         return 2.0 * int(np.count_nonzero(self.angles[:, 0])) / self.packing.count
 
     @cached_property
-    def branches(self) -> NDArray[np.float64]:
+    def branches(self) -> Floats:
         """Branch vectors from the centre of i to the touched image of j, shape (m, d) [m]."""
         centers = self.packing.centers
         lengths = np.asarray(self.packing.box.lengths)
         return centers[self.pairs[:, 1]] - centers[self.pairs[:, 0]] + self.shifts * lengths
 
-    def walls_of(self, axis: int) -> NDArray[np.int64]:
+    def walls_of(self, axis: int) -> Ints:
         """Row numbers of the contacts with the two walls normal to an axis."""
         return np.flatnonzero(self.walls // 2 == axis)
 
@@ -140,7 +141,7 @@ class ContactNetwork:
         )
         return self.with_resistance(values / ball_measure(reach, self.packing.dimension - 1))
 
-    def cut_measures(self, *, prescribed: bool = False) -> NDArray[np.float64]:
+    def cut_measures(self, *, prescribed: bool = False) -> Floats:
         """Area (volume) of each particle less what its contacts cut off, shape (n,) [m2, in 3D m3].
 
         V = |ball| - sum_i of the segments (caps) beyond the contacts, walls of all kinds included; they are taken for
@@ -159,7 +160,7 @@ class ContactNetwork:
         cut = np.bincount(owner, law_of(packing.dimension).cut(alpha), minlength=packing.count)
         return np.asarray(packing.measures - packing.radii**packing.dimension * cut)
 
-    def select(self, contacts: NDArray[np.bool_], wall_contacts: NDArray[np.bool_]) -> ContactNetwork:
+    def select(self, contacts: Flags, wall_contacts: Flags) -> ContactNetwork:
         """The network of the marked links; the particles stay."""
         return replace(
             self,
@@ -174,7 +175,7 @@ class ContactNetwork:
         )
 
 
-def _resistances(values: ArrayLike, size: int) -> NDArray[np.float64]:
+def _resistances(values: ArrayLike, size: int) -> Floats:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim and array.shape != (size,):
         raise InputError(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.medium.medium import Medium
 from etc_engine.packing.neighbors import neighbor_pairs
@@ -24,7 +25,7 @@ ROUNDING = 1e-9
 """Overlaps below this, in mean radii, are contacts."""
 
 
-def find_owners(packing: ParticlePacking, points: ArrayLike) -> NDArray[np.int64]:
+def find_owners(packing: ParticlePacking, points: ArrayLike) -> Ints:
     """Row number of the particle that holds each point, `PORE` for none.
 
     Parameters
@@ -58,7 +59,7 @@ def find_owners(packing: ParticlePacking, points: ArrayLike) -> NDArray[np.int64
     return owner
 
 
-def conductivity_at(medium: Medium, points: ArrayLike) -> NDArray[np.float64]:
+def conductivity_at(medium: Medium, points: ArrayLike) -> Floats:
     """Conductivity at each point, shape (m,) [W/(m K)]; points as in `find_owners`.
 
     Examples
@@ -73,7 +74,7 @@ def conductivity_at(medium: Medium, points: ArrayLike) -> NDArray[np.float64]:
     return of_owners(medium, find_owners(medium.packing, points))
 
 
-def of_owners(medium: Medium, owners: NDArray[np.int64]) -> NDArray[np.float64]:
+def of_owners(medium: Medium, owners: Ints) -> Floats:
     """Conductivity of the particle, or of the pores, that each number of `find_owners` names [W/(m K)]."""
     return np.append(medium.conductivity, medium.pores.conductivity)[owners]
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import GeometryError
 from etc_engine.laws.by_dimension import law_of
 from etc_engine.medium.network import ContactNetwork
@@ -28,10 +28,10 @@ class InsulatedCuts:
         Its half-angle.
     """
 
-    particles: NDArray[np.int64]
-    walls: NDArray[np.int64]
-    arms: NDArray[np.float64]
-    alpha: NDArray[np.float64]
+    particles: Ints
+    walls: Ints
+    arms: Floats
+    alpha: Floats
 
 
 NONE = np.zeros(0, dtype=np.int64)
@@ -66,14 +66,14 @@ class ContactSides:
         What insulated walls cut off; only ``exact`` heeds it.
     """
 
-    offsets: NDArray[np.int64]
-    nodes: NDArray[np.int64]
-    arms: NDArray[np.float64]
-    alpha: NDArray[np.float64]
-    resistances: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    of_contacts: NDArray[np.int64]
-    of_walls: NDArray[np.int64]
+    offsets: Ints
+    nodes: Ints
+    arms: Floats
+    alpha: Floats
+    resistances: Floats
+    radii: Floats
+    of_contacts: Ints
+    of_walls: Ints
     cuts: InsulatedCuts = NO_CUTS
 
     @property
@@ -82,19 +82,19 @@ class ContactSides:
         return int(self.arms.shape[1])
 
     @property
-    def particles(self) -> NDArray[np.int64]:
+    def particles(self) -> Ints:
         """Particle of each side, shape (s,)."""
         return np.repeat(np.arange(self.offsets.size - 1), np.diff(self.offsets))
 
     @property
-    def mode_signs(self) -> NDArray[np.float64]:
+    def mode_signs(self) -> Floats:
         """-1 at the second side of a particle contact, whose arc runs the other way: odd modes change sign there."""
         signs = np.ones(self.nodes.size)
         signs[self.of_contacts[:, 1]] = -1.0
         return signs
 
 
-def insulated_cuts(network: ContactNetwork, driven: NDArray[np.bool_]) -> InsulatedCuts:
+def insulated_cuts(network: ContactNetwork, driven: Flags) -> InsulatedCuts:
     """The cuts at the wall contacts that are not driven; none where arcs are prescribed.
 
     Parameters
@@ -109,7 +109,7 @@ def insulated_cuts(network: ContactNetwork, driven: NDArray[np.bool_]) -> Insula
     return InsulatedCuts(network.wall_particles[rows], rows, arms, network.wall_angles[rows])
 
 
-def wall_normals(walls: NDArray[np.int64], dimension: int) -> NDArray[np.float64]:
+def wall_normals(walls: Ints, dimension: int) -> Floats:
     """Outward unit normals of walls, shape (w, d)."""
     normals = np.zeros((walls.size, dimension))
     normals[np.arange(walls.size), walls // 2] = 2.0 * (walls % 2) - 1.0
@@ -162,7 +162,7 @@ def check_arcs(sides: ContactSides) -> None:
     refuse_overlap(sides.offsets, sides.arms, sides.alpha)
 
 
-def refuse_overlap(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
+def refuse_overlap(offsets: Ints, arms: Floats, alpha: Floats) -> None:
     """Raise the error of `check_arcs` for the contacts ``offsets[p]`` to ``offsets[p + 1]`` of each particle p."""
     normals = unit_vectors(arms)
     number, a, b = _close_pairs(offsets, normals, alpha, 1.0)
@@ -176,7 +176,7 @@ def refuse_overlap(offsets: NDArray[np.int64], arms: NDArray[np.float64], alpha:
         )
 
 
-def unit_vectors(arms: NDArray[np.float64]) -> NDArray[np.float64]:
+def unit_vectors(arms: Floats) -> Floats:
     """Directions of arms, shape (s, d)."""
     lengths = np.sqrt((arms**2).sum(axis=1))
     return np.ascontiguousarray(arms / np.where(lengths > 0.0, lengths, 1.0)[:, None])
@@ -192,9 +192,7 @@ def count_close_arcs(sides: ContactSides) -> int:
 
 
 @njit(cache=True)
-def _close_pairs(
-    offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha: NDArray[np.float64], factor: float
-) -> tuple[int, int, int]:
+def _close_pairs(offsets: Ints, normals: Floats, alpha: Floats, factor: float) -> tuple[int, int, int]:
     """Number of pairs on one particle closer than ``factor`` times the sum of their half-angles, and the first of them.
 
     The chord |n_a - n_b| = 2 sin(separation/2) keeps its digits for near directions, in 2D and 3D.

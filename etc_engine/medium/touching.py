@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
@@ -27,10 +27,10 @@ class Neighbors:
     """
 
     packing: ParticlePacking
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    wall_particles: NDArray[np.int64]
-    walls: NDArray[np.int64]
+    pairs: Ints
+    shifts: Ints
+    wall_particles: Ints
+    walls: Ints
 
 
 def find_neighbors(packing: ParticlePacking, gap: float) -> Neighbors:
@@ -57,13 +57,11 @@ def closest_neighbors(packing: ParticlePacking, coordination: float) -> Neighbor
     )
 
 
-def wall_distances_within(
-    packing: ParticlePacking, gap: float, sign: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def wall_distances_within(packing: ParticlePacking, gap: float, sign: float) -> tuple[Ints, Ints, Floats]:
     """Particles whose gap to a wall is at most ``sign * gap`` radii: (particle, wall, distance), wall by wall."""
-    particles: list[NDArray[np.int64]] = []
-    walls: list[NDArray[np.int64]] = []
-    distances: list[NDArray[np.float64]] = []
+    particles: list[Ints] = []
+    walls: list[Ints] = []
+    distances: list[Floats] = []
     for axis in range(packing.dimension):
         if packing.box.periodic[axis]:
             continue

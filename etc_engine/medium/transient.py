@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.sides import ContactSides
@@ -18,7 +19,7 @@ from etc_engine.solvers.marching import HeatSystem
 
 Source = ArrayLike | Callable[[float], ArrayLike]
 """Heat set free in all particles, in each, or a function of the time [W, in 2D W/m]."""
-Flows = Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
+Flows = Callable[[float, Floats], Floats]
 """(t, unknowns) -> heat flow into the particle at each contact side."""
 
 
@@ -34,10 +35,10 @@ class HeatSource:
         Times at which no step may reach across.
     """
 
-    rate: Callable[[float], NDArray[np.float64]]
+    rate: Callable[[float], Floats]
     knots: tuple[float, ...] = ()
 
-    def __call__(self, t: float) -> NDArray[np.float64]:
+    def __call__(self, t: float) -> Floats:
         """The heat at a time."""
         return self.rate(t)
 
@@ -70,7 +71,7 @@ class ParticleSystem:
     medium: Medium
     nodes: WallNodes
     sides: ContactSides
-    wall_contacts: NDArray[np.int64]
+    wall_contacts: Ints
     flows: Flows
     modes: int = 1
 
@@ -79,7 +80,7 @@ class ParticleSystem:
         """States of a particle."""
         return self.nodes.states // self.medium.packing.count
 
-    def initial(self, temperatures: ArrayLike | Callable[[NDArray[np.float64]], ArrayLike]) -> NDArray[np.float64]:
+    def initial(self, temperatures: ArrayLike | Callable[[Floats], ArrayLike]) -> Floats:
         """Unknowns of particles that are isothermal: a value, one for each, or a function of the centres (n, d).
 
         Raises
@@ -94,20 +95,20 @@ class ParticleSystem:
         start[start.size - self.nodes.states :] = np.repeat(particles, self.states)
         return start
 
-    def state_temperatures(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def state_temperatures(self, unknowns: Floats) -> Floats:
         """Temperatures of the states of each particle, shape (n, states) [K]."""
         return unknowns[unknowns.size - self.nodes.states :].reshape(-1, self.states)
 
-    def particle_temperatures(self, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def particle_temperatures(self, unknowns: Floats) -> Floats:
         """Mean temperature of each particle, shape (n,) [K]."""
         return np.asarray(self.state_temperatures(unknowns).mean(axis=1))
 
     @property
-    def capacities(self) -> NDArray[np.float64]:
+    def capacities(self) -> Floats:
         """Heat capacity of each particle, shape (n,) [J/K, in 2D J/(m K)]."""
         return np.asarray(self.state_temperatures(self.heat.capacity).sum(axis=1))
 
-    def wall_temperatures(self, time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def wall_temperatures(self, time: float, unknowns: Floats) -> Floats:
         """Temperature of each wall of the box [K]; NaN where an insulated or untouched one has none."""
         walls = np.full(len(self.nodes.conditions), np.nan)
         for wall, condition in enumerate(self.nodes.conditions):
@@ -117,7 +118,7 @@ class ParticleSystem:
         walls[plates] = unknowns[self.nodes.plates[plates]]
         return walls
 
-    def node_temperatures(self, time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def node_temperatures(self, time: float, unknowns: Floats) -> Floats:
         """Temperature of every node, unknown or given."""
         known = np.append(unknowns, 0.0)[self.nodes.unknowns]
         return np.asarray(known + self.nodes.fixed @ self.nodes.temperatures(time))
@@ -137,12 +138,12 @@ def particle_sides(system: ParticleSystem, particle: int) -> slice:
     return slice(int(system.sides.offsets[particle]), int(system.sides.offsets[particle + 1]))
 
 
-def joined_walls(walls: NDArray[np.int64], conditions: tuple[WallCondition, ...]) -> NDArray[np.bool_]:
+def joined_walls(walls: Ints, conditions: tuple[WallCondition, ...]) -> Flags:
     """Wall contacts at walls that are not insulated, shape (w,)."""
     return np.array([not isinstance(c, Insulated) for c in conditions])[walls]
 
 
-def particle_capacities(medium: Medium, given: NDArray[np.float64] | None, *, cut: bool) -> NDArray[np.float64]:
+def particle_capacities(medium: Medium, given: Floats | None, *, cut: bool) -> Floats:
     """Heat capacity of each particle, shape (n,) [J/K, in 2D J/(m K)].
 
     Parameters
@@ -168,7 +169,7 @@ def particle_capacities(medium: Medium, given: NDArray[np.float64] | None, *, cu
 def state_source(source: Source, count: int, states: int) -> HeatSource:
     """Heat set free in each state of each particle at a time."""
 
-    def spread(values: ArrayLike) -> NDArray[np.float64]:
+    def spread(values: ArrayLike) -> Floats:
         return np.repeat(particle_values(values, count, "source") / states, states)
 
     if callable(source):

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.medium.walls import WALLS, Convective, FixedTemperature, HeatFlux, Insulated, WallCondition
@@ -26,7 +26,7 @@ Both carry the same flow. Over the film it balances exactly, except for rounding
 balances to what an iterative solver left there.
 """
 
-Source = Callable[[float], NDArray[np.float64]]
+Source = Callable[[float], Floats]
 """t -> heat set free in each state [W, in 2D W/m]."""
 
 
@@ -55,19 +55,19 @@ class WallNodes:
     """
 
     conditions: tuple[WallCondition, ...]
-    plates: NDArray[np.int64]
-    faces: NDArray[np.float64]
-    exchange: NDArray[np.float64]
-    unknowns: NDArray[np.int64]
+    plates: Ints
+    faces: Floats
+    exchange: Floats
+    unknowns: Ints
     fixed: csr_matrix
     size: int
     states: int
 
-    def temperatures(self, t: float) -> NDArray[np.float64]:
+    def temperatures(self, t: float) -> Floats:
         """Given wall temperatures, shape (walls,), 0 where there is none [K]."""
         return np.array([c.temperature(t) if isinstance(c, FixedTemperature) else 0.0 for c in self.conditions])
 
-    def plate_heat(self, t: float) -> NDArray[np.float64]:
+    def plate_heat(self, t: float) -> Floats:
         """Given part of the heat into each plate, shape (walls,) [W/m]."""
         heat = np.zeros(len(self.conditions))
         for wall in np.flatnonzero(self.plates >= 0):
@@ -81,7 +81,7 @@ class WallNodes:
 
 def number_nodes(
     box: Box,
-    walls: NDArray[np.int64],
+    walls: Ints,
     conditions: tuple[WallCondition, ...],
     *,
     contacts: int = 0,
@@ -139,7 +139,7 @@ def number_nodes(
     )
 
 
-def heat_system(matrix: csr_matrix, nodes: WallNodes, capacities: NDArray[np.float64], source: Source) -> HeatSystem:
+def heat_system(matrix: csr_matrix, nodes: WallNodes, capacities: Floats, source: Source) -> HeatSystem:
     """Heat system of the unknowns; its heat flows are those into the particles at walls 0, 1, ... and from the sources.
 
     Parameters
@@ -164,20 +164,20 @@ def heat_system(matrix: csr_matrix, nodes: WallNodes, capacities: NDArray[np.flo
     links = -np.asarray((fold.T @ matrix @ nodes.fixed).todense())  # between unknowns and walls of given temperature
     own = np.asarray((nodes.fixed.T @ matrix @ nodes.fixed).todense())
 
-    def load(t: float) -> NDArray[np.float64]:
+    def load(t: float) -> Floats:
         f = links @ nodes.temperatures(t)
         f[nodes.size - nodes.states :] += source(t)
         f[at] += nodes.plate_heat(t)[plates]
         return np.asarray(f)
 
-    def heat_rates(t: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
+    def heat_rates(t: float, temperatures: Floats) -> Floats:
         rates = nodes.plate_heat(t) + own @ nodes.temperatures(t) - links.T @ temperatures
         through_film = rates[plates] - (exchange * temperatures)[at]
         into_particles = behind @ temperatures - (links @ nodes.temperatures(t))[at]
         rates[plates] = np.where(by_film, through_film, into_particles)
         return np.append(rates, source(t).sum())
 
-    def source_load(t: float) -> NDArray[np.float64]:
+    def source_load(t: float) -> Floats:
         return np.concatenate([np.zeros(nodes.size - nodes.states), source(t)])
 
     knots = {knot for condition in nodes.conditions if not isinstance(condition, Insulated) for knot in condition.knots}

@@ -8,12 +8,12 @@ from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+
+from etc_engine.arrays import Floats
 
 Values: TypeAlias = Any
 """A number, an ndarray or an ``xarray.DataArray`` of numbers."""
 
-Floats: TypeAlias = NDArray[np.float64]
 """What the body of an `elementwise` function sees."""
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from etc_engine.models.broadcasting import Floats, elementwise
+from etc_engine.arrays import Floats
+from etc_engine.models.broadcasting import elementwise
 from etc_engine.models.granular import DENSE, LOOSE, fluid_film, log_remainder
 
 STEFAN_BOLTZMANN = 5.670374419e-8

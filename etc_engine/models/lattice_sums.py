@@ -6,10 +6,9 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gamma, gammaincc, gammaln
 
-from etc_engine.models.broadcasting import Floats
+from etc_engine.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def _space_coupling(lattice: Lattice, highest: int) -> tuple[Floats, Floats]:
     total = l[:, None] + l
     sums = space_sums(lattice, int(total.max()))
 
-    def interaction(m2: NDArray[np.int64]) -> Floats:
+    def interaction(m2: Ints) -> Floats:
         up, down = l[:, None] - m[:, None] + l + m2, l[:, None] + m[:, None] + l - m2
         shift = np.abs(m2 - m[:, None])
         single = 0.5 * (gammaln(l - m + 1.0) + gammaln(l + m + 1.0)) + (l + 0.5) * np.log(2.0)

@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from etc_engine.models.broadcasting import Floats, Values
+from etc_engine.arrays import Floats
+from etc_engine.models.broadcasting import Values
 
 Kind = Literal["estimate", "lower bound", "upper bound", "exact"]
 

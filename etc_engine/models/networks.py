@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from etc_engine.models.broadcasting import Floats, elementwise
+from etc_engine.arrays import Floats
+from etc_engine.models.broadcasting import elementwise
 from etc_engine.models.effective_media import self_consistent
 
 PERCOLATION_EXPONENT = {2: 1.30, 3: 2.0}

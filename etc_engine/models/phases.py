@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from etc_engine.models.broadcasting import Floats
+from etc_engine.arrays import Floats
 
 
 def with_pure_phases(k: Floats, k1: Floats, k2: Floats, fraction: Floats) -> Floats:

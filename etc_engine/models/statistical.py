@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from etc_engine.models.broadcasting import Floats, elementwise
+from etc_engine.arrays import Floats
+from etc_engine.models.broadcasting import elementwise
 from etc_engine.models.phases import conductivity_from_y, polarizability, with_pure_phases
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.medium.field import ParticleField
 
 
-def sample_image(field: ParticleField, pixels: int = 600) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def sample_image(field: ParticleField, pixels: int = 600) -> tuple[Floats, Ints]:
     """Temperatures on a regular grid of pixels over the box.
 
     Parameters
@@ -48,15 +48,15 @@ def sample_image(field: ParticleField, pixels: int = 600) -> tuple[NDArray[np.fl
 
 @njit(cache=True)
 def _owners(
-    centers: NDArray[np.float64],
-    radii: NDArray[np.float64],
-    reach: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-    periodic: NDArray[np.bool_],
+    centers: Floats,
+    radii: Floats,
+    reach: Floats,
+    lengths: Floats,
+    periodic: Flags,
     nx: int,
     ny: int,
     farthest: float,
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+) -> tuple[Ints, Floats]:
     """Owner of each pixel by the smallest power below ``farthest``, and the pixel's place relative to its centre."""
     owners = np.full((ny, nx), -1, dtype=np.int64)
     offsets = np.zeros((ny, nx, 2))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import OutputError
 from etc_engine.medium.field import ParticleField
 
@@ -79,7 +80,7 @@ def write_sphere_vtp(path: Path, field: ParticleField) -> None:
         raise OutputError(f"cannot write {path}")
 
 
-def _cells(rows: NDArray[np.int64]) -> Any:
+def _cells(rows: Ints) -> Any:
     """Cells of one width out of rows of point numbers."""
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray as ids
     from vtkmodules.vtkCommonDataModel import vtkCellArray
@@ -92,7 +93,7 @@ def _cells(rows: NDArray[np.int64]) -> Any:
 
 def _surfaces(
     field: ParticleField,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[Floats, Floats, Ints, Ints]:
     """Points, their temperatures, cells as rows of point numbers, and the sphere of each cell."""
     packing = field.medium.packing
     everyone = np.arange(packing.count)
@@ -107,14 +108,14 @@ def _surfaces(
     return points, temperatures, cells, np.repeat(everyone, len(triangles))
 
 
-def _lines(field: ParticleField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _lines(field: ParticleField) -> tuple[Floats, Floats]:
     """Ends of the line of each contact, centre to centre, shape (m, 2, 3), and its heat flow."""
     network = field.medium.links
     start = network.packing.centers[network.pairs[:, 0]]
     return np.stack([start, start + network.branches], axis=1), field.contact_flows
 
 
-def unit_sphere(halvings: int = 2) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def unit_sphere(halvings: int = 2) -> tuple[Floats, Ints]:
     """Points and triangles of an octahedron whose edges are halved and pushed out to the unit sphere.
 
     Examples

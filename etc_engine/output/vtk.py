@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError, OutputError
 from etc_engine.medium.field import ParticleField
 from etc_engine.output.sphere_vtk import write_sphere_vtp
@@ -72,7 +72,7 @@ def write_vtp(path: Path, field: ParticleField) -> None:
         raise OutputError(f"cannot write {path}")
 
 
-def vtk_cells(groups: list[NDArray[np.int64]]) -> Any:
+def vtk_cells(groups: list[Ints]) -> Any:
     """Cells of VTK out of lists of point numbers, each list of one width."""
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonDataModel import vtkCellArray
@@ -88,7 +88,7 @@ def vtk_cells(groups: list[NDArray[np.int64]]) -> Any:
 
 def _disks(
     field: ParticleField,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], list[NDArray[np.int64]], NDArray[np.int64]]:
+) -> tuple[Floats, Floats, list[Ints], Ints]:
     """Points, their temperatures, polygons as lists of point numbers by width, and the particle of each polygon."""
     packing = field.medium.packing
     turn = 2.0 * np.pi * np.arange(SPOKES) / SPOKES
@@ -117,7 +117,7 @@ def _disks(
     return packing.centers[particle] + offsets, temperature, [triangles, quadrilaterals], owner
 
 
-def _contacts(field: ParticleField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _contacts(field: ParticleField) -> tuple[Floats, Floats]:
     """Ends of the line of each contact, centre to centre, shape (m, 2, 2), and its heat flow."""
     network = field.medium.links
     start = network.packing.centers[network.pairs[:, 0]]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import Box
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.cell_grids import cell_grids, cell_of, cell_range
@@ -85,9 +85,7 @@ def pack_advancing_front(radii: RadiusDistribution, box: Box, rng: np.random.Gen
     return ParticlePacking(centers, sizes[: len(centers)], box)
 
 
-def pack_given_disks(
-    sizes: NDArray[np.float64], spare: RadiusDistribution, box: Box, rng: np.random.Generator
-) -> ParticlePacking:
+def pack_given_disks(sizes: Floats, spare: RadiusDistribution, box: Box, rng: np.random.Generator) -> ParticlePacking:
     """Pack exactly these disks, spread over the whole box, by the advancing front.
 
     The box is filled with the given disks and others from the distribution in random order; the others are
@@ -136,7 +134,7 @@ def pack_given_disks(
     )
 
 
-def enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) -> NDArray[np.float64]:
+def enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) -> Floats:
     """More radii than the box can hold: their full areas (volumes) exceed its own."""
     d = box.dimension
     block = int(1.1 * box.volume / radii.mean_measure(d)) + 10
@@ -148,7 +146,7 @@ def enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) 
         sizes = np.concatenate((sizes, radii.sample(block, rng)))
 
 
-def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) -> NDArray[np.float64]:
+def _fill_box(sizes: Floats, box: Box, rng: np.random.Generator) -> Floats:
     """Centres of as many of the disks, in their order, as the front can place."""
     if box.dimension != 2 or any(box.periodic):
         raise InputError(
@@ -159,7 +157,7 @@ def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) ->
         raise InputError(f"a disk of radius {sizes.max():g} is wider than the box {box.lengths}: use smaller radii")
     grids = cell_grids(sizes, box)
     corner = int(rng.integers(4))
-    centers: NDArray[np.float64] = _fill(sizes, grids, CORNERS[corner : corner + 1], RETRIES, WALL_DEPTH)
+    centers: Floats = _fill(sizes, grids, CORNERS[corner : corner + 1], RETRIES, WALL_DEPTH)
     if not _touches_all_walls(centers, sizes, box):  # a small box: start at every wall
         centers = _fill(sizes, grids, CORNERS, RETRIES, WALL_DEPTH)
     if not _touches_all_walls(centers, sizes, box):
@@ -167,7 +165,7 @@ def _fill_box(sizes: NDArray[np.float64], box: Box, rng: np.random.Generator) ->
     return centers
 
 
-def _touches_all_walls(centers: NDArray[np.float64], sizes: NDArray[np.float64], box: Box) -> bool:
+def _touches_all_walls(centers: Floats, sizes: Floats, box: Box) -> bool:
     r = sizes[: len(centers), None]
     gaps = np.concatenate((centers - r, np.asarray(box.lengths) - centers - r), axis=1)
     return bool((np.abs(gaps) <= 1e-9 * r).any(axis=0).all())

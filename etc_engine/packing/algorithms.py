@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import Box
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.advancing_front import enough_radii, pack_advancing_front, pack_given_disks
@@ -101,7 +101,7 @@ def pack(spec: PackingSpec, rng: np.random.Generator, progress: Progress | None 
     return METHODS[spec.method](spec, rng, progress)
 
 
-def _scaled_sizes(spec: PackingSpec, rng: np.random.Generator) -> NDArray[np.float64]:
+def _scaled_sizes(spec: PackingSpec, rng: np.random.Generator) -> Floats:
     """Radii for the count and density of the specification, scaled to meet the density exactly."""
     count = spec.count
     if count is None and (spec.density is None or spec.radii.scalable):

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 
 MAX_OCTAVES = 40
@@ -33,15 +33,15 @@ class CellGrids(NamedTuple):
         Periodic axes.
     """
 
-    level: NDArray[np.int64]
-    cells: NDArray[np.int64]
-    first_cell: NDArray[np.int64]
-    largest: NDArray[np.float64]
-    lengths: NDArray[np.float64]
-    periodic: NDArray[np.bool_]
+    level: Ints
+    cells: Ints
+    first_cell: Ints
+    largest: Floats
+    lengths: Floats
+    periodic: Flags
 
 
-def cell_grids(radii: NDArray[np.float64], box: Box, gap: float = 0.0, relative_gap: float = 0.0) -> CellGrids:
+def cell_grids(radii: Floats, box: Box, gap: float = 0.0, relative_gap: float = 0.0) -> CellGrids:
     """Cell grids for particles of these radii that are neighbours up to the given surface gaps.
 
     Notes

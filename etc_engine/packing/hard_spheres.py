@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import Box
 from etc_engine.packing.cell_grids import cell_grids
 from etc_engine.packing.event_queue import empty_queue, reschedule
@@ -49,29 +50,29 @@ class Gas(NamedTuple):
         Particles of each cell as linked lists, and the cell of each particle.
     """
 
-    state: NDArray[np.float64]
-    anchor: NDArray[np.float64]
-    times: NDArray[np.float64]
+    state: Floats
+    anchor: Floats
+    times: Floats
     partners: NDArray[np.int32]
     heap: NDArray[np.int32]
     place: NDArray[np.int32]
     lists: NDArray[np.int32]
-    offsets: NDArray[np.int64]
-    sizes: NDArray[np.int64]
-    frame: NDArray[np.float64]
-    level: NDArray[np.int64]
-    cells: NDArray[np.int64]
-    first_cell: NDArray[np.int64]
-    largest: NDArray[np.float64]
+    offsets: Ints
+    sizes: Ints
+    frame: Floats
+    level: Ints
+    cells: Ints
+    first_cell: Ints
+    largest: Floats
     heads: NDArray[np.int32]
     following: NDArray[np.int32]
-    home: NDArray[np.int64]
+    home: Ints
 
 
 def make_gas(
-    centers: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    shapes: NDArray[np.float64],
+    centers: Floats,
+    velocities: Floats,
+    shapes: Floats,
     box: Box,
     largest_scale: float,
     excursion: float,

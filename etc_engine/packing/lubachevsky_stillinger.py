@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.hard_spheres import DONE, EXCURSION, FULL, Gas, make_gas, run, start_lists
@@ -64,7 +64,7 @@ class Compression:
 
 
 def compress(
-    radii: NDArray[np.float64],
+    radii: Floats,
     box: Box,
     rng: np.random.Generator,
     *,
@@ -162,7 +162,7 @@ def compress(
 class _Grown(NamedTuple):
     """Where growth ended."""
 
-    centers: NDArray[np.float64]
+    centers: Floats
     scale: float
     pressure: float
     collisions: int
@@ -171,9 +171,9 @@ class _Grown(NamedTuple):
 
 
 def _grow(
-    centers: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    shapes: NDArray[np.float64],
+    centers: Floats,
+    velocities: Floats,
+    shapes: Floats,
     box: Box,
     scale: float,
     target: float,
@@ -206,13 +206,13 @@ def _grow(
     return _Grown(gas.state[:, :d], scale, float(pressure), int(collisions), int(renewals), arrived)
 
 
-def _unit_scale(radii: NDArray[np.float64], box: Box) -> float:
+def _unit_scale(radii: Floats, box: Box) -> float:
     """Factor on the radii that makes the density 1."""
     measures = np.pi * radii**2 if box.dimension == 2 else 4.0 / 3.0 * np.pi * radii**3
     return float((box.volume / measures.sum()) ** (1.0 / box.dimension))
 
 
-def _refuse_the_impossible(radii: NDArray[np.float64], box: Box, density: float | None) -> float:
+def _refuse_the_impossible(radii: Floats, box: Box, density: float | None) -> float:
     """The density to grow to: the one requested, if it is possible, or the highest one conceivable."""
     equal = bool(np.ptp(radii) == 0.0)
     highest = DENSEST[box.dimension] if equal else 1.0
@@ -247,9 +247,7 @@ def _refuse_to_stop_short(packing: ParticlePacking, density: float | None, press
     )
 
 
-def _random_start(
-    radii: NDArray[np.float64], box: Box, density: float, rng: np.random.Generator
-) -> tuple[float, NDArray[np.float64]]:
+def _random_start(radii: Floats, box: Box, density: float, rng: np.random.Generator) -> tuple[float, Floats]:
     """Random places without overlap at the density, or at a lower one where walls leave too little room."""
     largest_first = np.argsort(-radii, kind="stable")
     centers = np.empty((radii.size, box.dimension))
@@ -265,13 +263,13 @@ def _random_start(
         return density, centers
 
 
-def _spatial_order(centers: NDArray[np.float64], box: Box) -> NDArray[np.int64]:
+def _spatial_order(centers: Floats, box: Box) -> Ints:
     """Order of the particles along rows of blocks: neighbours in space are then near in memory."""
     blocks = np.floor(centers / (3.0 * (box.volume / len(centers)) ** (1.0 / box.dimension)))
     return np.lexsort(blocks.T)
 
 
-def _excursion(radii: NDArray[np.float64], box: Box) -> float:
+def _excursion(radii: Floats, box: Box) -> float:
     """Size of the neighbour lists' balls: so small that only the nearest image can be hit within them."""
     widths = [length for length, periodic in zip(box.lengths, box.periodic, strict=True) if periodic]
     if not widths:
@@ -292,6 +290,6 @@ def _cool(gas: Gas, box: Box) -> float:
     return float(np.sum(velocities**2))
 
 
-def _inside(centers: NDArray[np.float64], box: Box) -> NDArray[np.float64]:
+def _inside(centers: Floats, box: Box) -> Floats:
     """Centres with the rounding error of walls taken off."""
     return np.where(box.periodic, centers, np.clip(centers, 0.0, box.lengths))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.packing.cell_grids import cell_grids, cell_of, cell_range
 from etc_engine.packing.particles import ParticlePacking
@@ -27,9 +27,9 @@ class NeighborPairs:
         Surface gaps ``|x_j + s L - x_i| - R_i - R_j``; negative where particles overlap.
     """
 
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    gaps: NDArray[np.float64]
+    pairs: Ints
+    shifts: Ints
+    gaps: Floats
 
     @property
     def count(self) -> int:

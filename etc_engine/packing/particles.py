@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError, InputError
 
 
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _frozen(values: Floats) -> Floats:
     """An own, contiguous, read-only copy."""
     values = np.array(values, dtype=np.float64, order="C", copy=True)
     values.setflags(write=False)
@@ -48,8 +49,8 @@ class ParticlePacking:
     (2, 0.392699)
     """
 
-    centers: NDArray[np.float64]
-    radii: NDArray[np.float64]
+    centers: Floats
+    radii: Floats
     box: Box
 
     def __post_init__(self) -> None:
@@ -84,7 +85,7 @@ class ParticlePacking:
         return self.box.dimension
 
     @property
-    def measures(self) -> NDArray[np.float64]:
+    def measures(self) -> Floats:
         """Full area [m2] of each disk or volume [m3] of each sphere, shape (n,)."""
         return np.pi * self.radii**2 if self.dimension == 2 else 4.0 / 3.0 * np.pi * self.radii**3
 
@@ -93,16 +94,16 @@ class ParticlePacking:
         """Sum of the full particle areas (volumes) over the box's, overlaps counted twice."""
         return float(self.measures.sum() / self.box.volume)
 
-    def select(self, keep: NDArray[np.bool_] | NDArray[np.int64]) -> ParticlePacking:
+    def select(self, keep: Flags | Ints) -> ParticlePacking:
         """The packing of the particles picked by a mask or by row numbers, in that order."""
         return ParticlePacking(self.centers[keep], self.radii[keep], self.box)
 
-    def with_radii(self, radii: NDArray[np.float64]) -> ParticlePacking:
+    def with_radii(self, radii: Floats) -> ParticlePacking:
         """The same centres with other radii."""
         return ParticlePacking(self.centers, radii, self.box)
 
 
-def particle_values(values: ArrayLike, count: int, name: str) -> NDArray[np.float64]:
+def particle_values(values: ArrayLike, count: int, name: str) -> Floats:
     """One value for all particles, or one for each, as an array of its own of shape (count,).
 
     Raises
@@ -116,7 +117,7 @@ def particle_values(values: ArrayLike, count: int, name: str) -> NDArray[np.floa
     return np.broadcast_to(array, (count,)).copy()
 
 
-def _refuse_first(bad: NDArray[np.bool_] | np.bool_, what: str, values: NDArray[np.float64]) -> None:
+def _refuse_first(bad: Flags | np.bool_, what: str, values: Floats) -> None:
     bad = np.asarray(bad)
     if bad.any():
         row = int(np.flatnonzero(bad)[0])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 GAUSSIAN_CUT = 3.0
@@ -59,7 +59,7 @@ class RadiusDistribution:
         object.__setattr__(self, "parameters", tuple(float(value) for value in self.parameters))
         _check(self)
 
-    def sample(self, count: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    def sample(self, count: int, rng: np.random.Generator) -> Floats:
         """Independent radii [m], shape (count,)."""
         return _LAWS[self.kind].sample(self.parameters, count, rng)
 
@@ -173,7 +173,7 @@ def _check(radii: RadiusDistribution) -> None:
 class _Law(NamedTuple):
     """What a kind of distribution can do, as functions of its parameters."""
 
-    sample: Callable[[tuple[float, ...], int, np.random.Generator], NDArray[np.float64]]
+    sample: Callable[[tuple[float, ...], int, np.random.Generator], Floats]
     moment: Callable[[tuple[float, ...], int], float]
     support: Callable[[tuple[float, ...]], tuple[float, float]]
 

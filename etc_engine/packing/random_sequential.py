@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import Box
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.cell_grids import CellGrids, cell_grids, cell_of, cell_range
@@ -48,17 +49,17 @@ class Insertion:
 class _State:
     """Particles placed so far and the cell grids that hold them."""
 
-    sizes: NDArray[np.float64]
+    sizes: Floats
     grids: CellGrids
     heads: NDArray[np.int32]
     following: NDArray[np.int32]
-    centers: NDArray[np.float64]
+    centers: Floats
     dimension: int
     placed: int = 0
 
 
 def insert_randomly(
-    sizes: NDArray[np.float64],
+    sizes: Floats,
     box: Box,
     rng: np.random.Generator,
     progress: Callable[[float], None] | None = None,
@@ -117,9 +118,7 @@ def insert_randomly(
     return Insertion(ParticlePacking(centers, sizes[: state.placed], box), saturated)
 
 
-def insert_in_turn(
-    sizes: NDArray[np.float64], box: Box, rng: np.random.Generator, trials: int = 20_000
-) -> NDArray[np.float64]:
+def insert_in_turn(sizes: Floats, box: Box, rng: np.random.Generator, trials: int = 20_000) -> Floats:
     """Centres of all the particles, shape (n, d), inserted by plain trials; PackingError if one fails."""
     state = _start(sizes, box)
     if not _try_everywhere(state, box, rng, trials, None):
@@ -127,7 +126,7 @@ def insert_in_turn(
     return state.centers[:, : box.dimension]
 
 
-def refuse_wide_particles(sizes: NDArray[np.float64], box: Box) -> None:
+def refuse_wide_particles(sizes: Floats, box: Box) -> None:
     """Refuse particles wider than a walled box, or than half of a periodic one."""
     widest = 2.0 * float(sizes.max())
     for axis, length in enumerate(box.lengths):
@@ -139,14 +138,14 @@ def refuse_wide_particles(sizes: NDArray[np.float64], box: Box) -> None:
             )
 
 
-def _start(sizes: NDArray[np.float64], box: Box) -> _State:
+def _start(sizes: Floats, box: Box) -> _State:
     grids = cell_grids(sizes, box)
     heads = np.full(grids.first_cell[-1], -1, dtype=np.int32)
     following = np.full(sizes.size, -1, dtype=np.int32)
     return _State(sizes, grids, heads, following, np.zeros((sizes.size, 3)), box.dimension)
 
 
-def _try(state: _State, points: NDArray[np.float64], failures: int, most: int) -> int:
+def _try(state: _State, points: Floats, failures: int, most: int) -> int:
     """Use up trial points; returns the number of failures in a row."""
     arrays = (state.sizes, state.grids, state.heads, state.following, state.centers)
     state.placed, failures = _try_points(*arrays, points, state.dimension, state.placed, failures, most)

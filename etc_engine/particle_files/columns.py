@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import AXES
 from etc_engine.errors import InputError
 from etc_engine.particle_files.digits import Digits, printed_digits
@@ -142,7 +143,7 @@ class ColumnReader:
         numeric |= {name: layout.others.get(name) for name in ("conductivity", "temperature")}
         self.numeric = {name: column for name, column in numeric.items() if column is not None}
         self.rows = 0
-        self._batches: list[NDArray[np.float64]] = []
+        self._batches: list[Floats] = []
         self._types: list[NDArray[np.str_]] = []
         self._sample: dict[str, list[str]] = {name: [] for name in ("radius", *AXES) if name in self.numeric}
 
@@ -203,14 +204,14 @@ class ColumnReader:
                     return f"{where}: {name} is not a number: {word!r}{comma}"
         return f"{self.place} is not a table of numbers"
 
-    def column(self, name: str) -> NDArray[np.float64] | None:
+    def column(self, name: str) -> Floats | None:
         """The numbers of one column so far; None if the file has no such column."""
         if name not in self.numeric or not self._batches:
             return None
         place = list(self.numeric).index(name)
         return np.concatenate([batch[:, place] for batch in self._batches])
 
-    def positions(self) -> NDArray[np.float64]:
+    def positions(self) -> Floats:
         """Positions as they are printed, shape (n, 2) or (n, 3)."""
         found = [self.column(axis) for axis in AXES[: len(self.layout.positions)]]
         return np.stack([values for values in found if values is not None], axis=1)
@@ -219,7 +220,7 @@ class ColumnReader:
         """Types of the particles so far, as they are written."""
         return np.concatenate(self._types) if self._types else None
 
-    def ids(self) -> NDArray[np.int64] | None:
+    def ids(self) -> Ints | None:
         """Numbers of the particles so far.
 
         Raises

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.particle_files.columns import BATCH, batches
 from etc_engine.particle_files.items import Frame, find_frames, table_lines
@@ -63,15 +63,15 @@ class ContactTable:
     """
 
     place: str
-    ids: NDArray[np.int64]
-    columns: Mapping[str, NDArray[np.float64]]
+    ids: Ints
+    columns: Mapping[str, Floats]
 
     @property
     def count(self) -> int:
         """Number of contacts."""
         return len(self.ids)
 
-    def column(self, word: str) -> NDArray[np.float64]:
+    def column(self, word: str) -> Floats:
         """One column.
 
         Raises
@@ -139,7 +139,7 @@ def read_contacts(path: Path | str, frame: int = -1, words: Sequence[str] = ()) 
     return ContactTable(place, ids.astype(np.int64), narrow)
 
 
-def contact_rows(table: ParticleTable, contacts: ContactTable) -> NDArray[np.int64]:
+def contact_rows(table: ParticleTable, contacts: ContactTable) -> Ints:
     """Row numbers of the two particles of each contact whose particles are in the packing; (-1, -1) of the others.
 
     Parameters
@@ -174,7 +174,7 @@ def contact_rows(table: ParticleTable, contacts: ContactTable) -> NDArray[np.int
     return rows
 
 
-def _check_places(table: ParticleTable, contacts: ContactTable, rows: NDArray[np.int64]) -> None:
+def _check_places(table: ParticleTable, contacts: ContactTable, rows: Ints) -> None:
     """Refuse contacts of another moment: their centres are elsewhere."""
     packing = table.packing
     d = packing.dimension
@@ -223,7 +223,7 @@ def _spans(place: str, names: Sequence[str], words: Sequence[str]) -> dict[str, 
     return spans
 
 
-def _numbers(path: Path, place: str, frame: Frame, count: int, width: int) -> NDArray[np.float64]:
+def _numbers(path: Path, place: str, frame: Frame, count: int, width: int) -> Floats:
     block = frame.blocks["ENTRIES"]
     found = [np.zeros((0, width))]
     with open_stream(path) as stream:

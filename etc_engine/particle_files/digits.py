@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from etc_engine.arrays import Floats, Ints
 
 EXACT = 15
 """From this many significant digits on, the rounding of a number is that of the arithmetic itself."""
@@ -39,7 +40,7 @@ class Digits:
     decimals: int
     relative: float = 0.0
 
-    def step(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def step(self, values: Floats) -> Floats:
         """Step at each value, in the units that are printed; zero where all digits of a double are printed."""
         size = np.abs(values)
         if self.relative:
@@ -59,7 +60,7 @@ class PrintedColumn:
     factor: float = 1.0
     offset: float = 0.0
 
-    def step(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def step(self, values: Floats) -> Floats:
         """Step [m] at coordinates of the file [m]."""
         return abs(self.factor) * self.digits.step((values - self.offset) / self.factor)
 
@@ -119,7 +120,7 @@ def printed_digits(columns: Mapping[str, Sequence[str]]) -> dict[str, Digits] | 
     return {name: own.get(name, shared) for name in columns}
 
 
-def _counts(words: Sequence[str]) -> NDArray[np.int64]:
+def _counts(words: Sequence[str]) -> Ints:
     """Significant digits and decimals of each different number that is not zero, shape (k, 2)."""
     found = []
     for word in dict.fromkeys(words):
@@ -135,7 +136,7 @@ def _counts(words: Sequence[str]) -> NDArray[np.int64]:
     return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def _looks_rounded(counts: NDArray[np.int64]) -> bool:
+def _looks_rounded(counts: Ints) -> bool:
     """Whether most of a dozen or more different numbers use nearly all digits or decimals of the longest one."""
     longest = counts.max(axis=0)
     if len(counts) < 12 or longest[0] < 3:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import AXES
 from etc_engine.errors import InputError
 from etc_engine.particle_files.columns import BATCH, ColumnReader, batches, find_layout
@@ -137,7 +137,7 @@ def read_trajectory(path: Path | str, timestep: float = 1.0, sample: Sample | No
     return Trajectory(times, tuple(table.packing for table in tables), first.ids, first.conductivity, tuple(tables))
 
 
-def _refuse_others(path: Path, number: int, ids: NDArray[np.int64], first: NDArray[np.int64] | None) -> None:
+def _refuse_others(path: Path, number: int, ids: Ints, first: Ints | None) -> None:
     """Refuse a frame that does not hold the particles of the first one."""
     assert first is not None
     if np.array_equal(ids, first):
@@ -290,7 +290,7 @@ def _sorted_rows(place: str, frame: Frame, reader: ColumnReader, scale: float) -
     )
 
 
-def _printed(reader: ColumnReader, bounds: NDArray[np.float64], scale: float) -> PrintedColumns | None:
+def _printed(reader: ColumnReader, bounds: Floats, scale: float) -> PrintedColumns | None:
     """How finely positions and radii are printed, scaled positions in parts of the box."""
     digits = reader.digits()
     if digits is None:
@@ -334,7 +334,7 @@ def _scale(path: Path, frames: list[Frame]) -> float:
     return UNITS[style]
 
 
-def _box(place: str, frame: Frame) -> tuple[NDArray[np.float64], tuple[bool, ...]]:
+def _box(place: str, frame: Frame) -> tuple[Floats, tuple[bool, ...]]:
     """Faces of the box, shape (3, 2), and its periodic axes; a tilted box is refused."""
     block = frame.blocks["BOX BOUNDS"]
     words = list(block.words)

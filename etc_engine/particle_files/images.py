@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Ints
 from etc_engine.errors import InputError
 
 NUMPY = b"\x93NUMPY"
@@ -32,7 +33,7 @@ class LabelImage:
         The different labels, rising.
     """
 
-    labels: NDArray[np.int64]
+    labels: Ints
     phases: tuple[int, ...]
 
     @property

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.table import ParticleTable
@@ -89,7 +89,7 @@ def doubtful_contacts(table: ParticleTable, relative_gap: float = 0.0) -> Doubt 
     return Doubt(int(doubtful.sum()), int(wall_steps.size), float(np.median(half)), table.printed.remedy)
 
 
-def _steps(table: ParticleTable) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _steps(table: ParticleTable) -> tuple[Floats, Floats]:
     """Printed step of each coordinate, shape (n, d), and of each radius, shape (n,) [m]."""
     packing, printed = table.packing, table.printed
     assert printed is not None
@@ -98,9 +98,7 @@ def _steps(table: ParticleTable) -> tuple[NDArray[np.float64], NDArray[np.float6
     return np.stack(columns, axis=1), printed.radius.step(packing.radii)
 
 
-def _wall_doubts(
-    packing: ParticlePacking, steps: NDArray[np.float64], radius_steps: NDArray[np.float64], relative_gap: float
-) -> NDArray[np.float64]:
+def _wall_doubts(packing: ParticlePacking, steps: Floats, radius_steps: Floats, relative_gap: float) -> Floats:
     """Two steps of each gap between a particle and a wall that is in doubt."""
     found = [np.zeros(0)]
     for axis in np.flatnonzero(~np.array(packing.box.periodic)):

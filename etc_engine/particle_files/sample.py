@@ -8,6 +8,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import AXES, Box, parse_periodic
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
@@ -78,15 +79,15 @@ class Rows:
     """
 
     place: str
-    positions: NDArray[np.float64]
-    radii: NDArray[np.float64]
-    bounds: NDArray[np.float64] | None = None
+    positions: Floats
+    radii: Floats
+    bounds: Floats | None = None
     periodic: tuple[bool, ...] | None = None
     planar: bool | None = None
-    conductivity: NDArray[np.float64] | None = None
-    ids: NDArray[np.int64] | None = None
+    conductivity: Floats | None = None
+    ids: Ints | None = None
     types: NDArray[np.str_] | None = None
-    temperature: NDArray[np.float64] | None = None
+    temperature: Floats | None = None
     printed: PrintedColumns | None = None
     scale: float = 1.0
     notes: tuple[str, ...] = ()
@@ -148,8 +149,8 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
 
 
 def _crop(
-    rows: Rows, crop: tuple[Range, ...], bounds: NDArray[np.float64], periodic: tuple[bool, ...]
-) -> tuple[NDArray[np.float64], tuple[bool, ...], tuple[bool, ...]]:
+    rows: Rows, crop: tuple[Range, ...], bounds: Floats, periodic: tuple[bool, ...]
+) -> tuple[Floats, tuple[bool, ...], tuple[bool, ...]]:
     """Faces and periodic axes after the crop, and which walls it made."""
     if len(crop) != len(bounds):
         raise InputError(f"a crop of a {len(bounds)}D box needs {len(bounds)} ranges low:high, found {len(crop)}")
@@ -175,11 +176,11 @@ def _crop(
     return faces, tuple(flags), tuple(cropped)
 
 
-def _words(bounds: NDArray[np.float64]) -> str:
+def _words(bounds: Floats) -> str:
     return ", ".join(f"{low:g}:{high:g}" for low, high in bounds)
 
 
-def _extent(centers: NDArray[np.float64]) -> str:
+def _extent(centers: Floats) -> str:
     return _words(np.stack([centers.min(axis=0), centers.max(axis=0)], axis=1))
 
 
@@ -217,7 +218,7 @@ def _slack(rows: Rows) -> float:
     return FLAT * float(np.abs(rows.radii).max())
 
 
-def _flat_dimension(rows: Rows, slab: NDArray[np.float64]) -> tuple[int, tuple[str, ...]]:
+def _flat_dimension(rows: Rows, slab: Floats) -> tuple[int, tuple[str, ...]]:
     """Dimension of one layer in a 3D box: disks in the slab that LAMMPS keeps about z = 0 in two dimensions, else
     spheres.
 
@@ -242,7 +243,7 @@ def _flat_dimension(rows: Rows, slab: NDArray[np.float64]) -> tuple[int, tuple[s
     )
 
 
-def _faces(rows: Rows, sample: Sample, dimension: int) -> tuple[NDArray[np.float64], tuple[bool, ...]]:
+def _faces(rows: Rows, sample: Sample, dimension: int) -> tuple[Floats, tuple[bool, ...]]:
     """Faces of the box, shape (d, 2), and its periodic axes."""
     if sample.box is None and rows.bounds is None:
         raise InputError(

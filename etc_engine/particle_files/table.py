@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.digits import PrintedColumns
 
@@ -39,11 +40,11 @@ class ParticleTable:
     """
 
     packing: ParticlePacking
-    conductivity: NDArray[np.float64] | None = None
-    ids: NDArray[np.int64] | None = None
+    conductivity: Floats | None = None
+    ids: Ints | None = None
     wrapped: int = 0
     types: NDArray[np.str_] | None = None
-    temperature: NDArray[np.float64] | None = None
+    temperature: Floats | None = None
     origin: tuple[float, ...] = ()
     printed: PrintedColumns | None = None
     cropped: tuple[bool, ...] = ()

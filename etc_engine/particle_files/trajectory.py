@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.table import ParticleTable
@@ -42,10 +42,10 @@ class Trajectory:
     1
     """
 
-    times: NDArray[np.float64]
+    times: Floats
     packings: tuple[ParticlePacking, ...]
-    ids: NDArray[np.int64] | None = None
-    conductivity: NDArray[np.float64] | None = None
+    ids: Ints | None = None
+    conductivity: Floats | None = None
     tables: tuple[ParticleTable, ...] = ()
 
     def __post_init__(self) -> None:

@@ -7,8 +7,8 @@ import shlex
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import AXES
 from etc_engine.errors import InputError
 from etc_engine.particle_files.counted import count_counted, pick_frame, read_rows
@@ -104,7 +104,7 @@ def _columns(path: Path, properties: str) -> list[str]:
     return names
 
 
-def _bounds(place: str, entries: dict[str, str]) -> NDArray[np.float64] | None:
+def _bounds(place: str, entries: dict[str, str]) -> Floats | None:
     if "lattice" not in entries:
         return None
     try:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import ConvergenceError, EtcError
 from etc_engine.medium.conductances import mean_field_conductivity
 from etc_engine.medium.conduction import Result
@@ -40,7 +40,7 @@ class Outcome:
 
     status: Status
     message: str = ""
-    conductivity: NDArray[np.float64] | None = None
+    conductivity: Floats | None = None
     contacts: int = 0
     wall_contacts: int = 0
     coordination: float = np.nan

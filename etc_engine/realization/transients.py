@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.transient import ParticleSystem, Source
@@ -23,7 +21,7 @@ def transient_system(
     engine: str = "dtem",
     method: str | None = None,
     source: Source = 0.0,
-    capacities: NDArray[np.float64] | None = None,
+    capacities: Floats | None = None,
     **options: Any,
 ) -> ParticleSystem:
     """A medium ready to be marched in time, with the conditions at the walls of its box.

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import InputError
@@ -104,7 +104,7 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
     return found
 
 
-def _over_density(values: xarray.DataArray) -> NDArray[np.float64]:
+def _over_density(values: xarray.DataArray) -> Floats:
     """The first curve of an array that may have several."""
     other = {name: 0 for name in values.dims if name != "density"}
     return np.asarray(values.isel(other).values, dtype=np.float64)

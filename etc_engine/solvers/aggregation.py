@@ -9,8 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
+
+from etc_engine.arrays import Floats
 
 STRENGTH = 0.08
 """Entries below this part of the geometric mean of their diagonals do not aggregate."""
@@ -68,7 +69,7 @@ def aggregation_hierarchy(matrix: csr_matrix) -> Any:
     return hierarchy
 
 
-def _tentative(matrix: csr_matrix, near_kernel: NDArray[np.float64]) -> tuple[csr_matrix, NDArray[np.float64]]:
+def _tentative(matrix: csr_matrix, near_kernel: Floats) -> tuple[csr_matrix, Floats]:
     """Prolongator of orthonormal columns, one an aggregate, that carries the near kernel, and that of its level."""
     from pyamg.aggregation.aggregate import standard_aggregation
     from pyamg.strength import symmetric_strength_of_connection

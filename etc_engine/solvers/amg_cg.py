@@ -19,11 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigvalsh_tridiagonal
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import ConvergenceError
 from etc_engine.solvers.aggregation import aggregation_hierarchy
 from etc_engine.solvers.summation import dot
@@ -52,7 +52,7 @@ class Preconditioner:
         Time of the set-up.
     """
 
-    apply: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    apply: Callable[[Floats], Floats]
     levels: int
     seconds: float
 
@@ -136,7 +136,7 @@ def build_preconditioner(matrix: csr_matrix, exact_level: int = EXACT_LEVEL) -> 
     return Preconditioner(apply, levels, time.perf_counter() - start)
 
 
-def _factorise(matrix: csr_matrix) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def _factorise(matrix: csr_matrix) -> Callable[[Floats], Floats]:
     factor = splu(
         csc_matrix(matrix),
         permc_spec="MMD_AT_PLUS_A",
@@ -148,15 +148,15 @@ def _factorise(matrix: csr_matrix) -> Callable[[NDArray[np.float64]], NDArray[np
 
 def solve_energy(
     matrix: csr_matrix,
-    rhs: NDArray[np.float64],
+    rhs: Floats,
     lift_energy: float,
     *,
     preconditioner: Preconditioner | None = None,
-    initial: NDArray[np.float64] | None = None,
+    initial: Floats | None = None,
     tolerance: float = 1e-10,
-    conserved: NDArray[np.float64] | None = None,
+    conserved: Floats | None = None,
     limits: Limits = DEFAULT_LIMITS,
-) -> tuple[NDArray[np.float64], SolveReport]:
+) -> tuple[Floats, SolveReport]:
     """Solve K u = b until the energy E = lift_energy - b . u is known to a relative tolerance.
 
     Parameters
@@ -273,15 +273,15 @@ def solve_energy(
 
 def solve_loads(
     matrix: csr_matrix,
-    rhs: NDArray[np.float64],
-    lift_energies: NDArray[np.float64],
+    rhs: Floats,
+    lift_energies: Floats,
     *,
     preconditioner: Preconditioner | None = None,
-    initial: NDArray[np.float64] | None = None,
+    initial: Floats | None = None,
     tolerance: float = 1e-10,
-    conserved: NDArray[np.float64] | None = None,
+    conserved: Floats | None = None,
     limits: Limits = DEFAULT_LIMITS,
-) -> tuple[NDArray[np.float64], tuple[SolveReport, ...]]:
+) -> tuple[Floats, tuple[SolveReport, ...]]:
     """Solve K u_a = b_a for all loads a of one matrix, with one preconditioner.
 
     Parameters
@@ -328,9 +328,7 @@ def solve_loads(
     return u, tuple(reports)
 
 
-def _balance(
-    matrix: csr_matrix, rhs: NDArray[np.float64], u: NDArray[np.float64], uniform: NDArray[np.float64]
-) -> float:
+def _balance(matrix: csr_matrix, rhs: Floats, u: Floats, uniform: Floats) -> float:
     """Shift u, in place, by the uniform temperature that balances the heat flows; returns what is left of w . r."""
     load = matrix @ uniform
     residual = rhs - matrix @ u

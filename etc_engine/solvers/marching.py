@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigvalsh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.solvers import time_steps
 from etc_engine.solvers.amg_cg import EXACT_LEVEL
@@ -66,14 +66,14 @@ class MarchState:
     """
 
     time: float
-    temperatures: NDArray[np.float64]
-    heat: NDArray[np.float64]
+    temperatures: Floats
+    heat: Floats
     stored: float
     steps: int
     iterations: int
     step: float
-    older: NDArray[np.float64]
-    last_heat: NDArray[np.float64]
+    older: Floats
+    last_heat: Floats
 
     @property
     def imbalance(self) -> float:
@@ -83,8 +83,8 @@ class MarchState:
 
 def march(
     system: HeatSystem,
-    initial: NDArray[np.float64],
-    times: Sequence[float] | NDArray[np.float64],
+    initial: Floats,
+    times: Sequence[float] | Floats,
     *,
     scheme: str = "bdf2",
     step: float | None = None,
@@ -201,7 +201,7 @@ class _Run:
 
     system: HeatSystem
     scheme: str
-    initial: NDArray[np.float64]
+    initial: Floats
     algebraic: AlgebraicRows
     solver_tolerance: float
     tolerance: float
@@ -372,7 +372,7 @@ def critical_step(system: HeatSystem) -> float:
     inner = HeatSystem(system.capacity, system.conductance, lambda _: np.zeros(system.capacity.size))
     algebraic = algebraic_rows(inner, 1e-12)
 
-    def apply(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apply(x: Floats) -> Floats:
         full = np.zeros(system.capacity.size)
         full[stores] = scale * x.ravel()
         return np.asarray(scale * (system.conductance @ algebraic.fit(inner, 0.0, full))[stores])
@@ -389,8 +389,8 @@ def critical_step(system: HeatSystem) -> float:
 
 def _checked(
     system: HeatSystem,
-    initial: NDArray[np.float64],
-    times: Sequence[float] | NDArray[np.float64],
+    initial: Floats,
+    times: Sequence[float] | Floats,
     scheme: str,
     step: float | None,
     steps: int | None,

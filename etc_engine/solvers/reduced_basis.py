@@ -20,10 +20,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import ConvergenceError
 from etc_engine.solvers.amg_cg import ROUND_OFF, Limits, Preconditioner, build_preconditioner, solve_loads
 from etc_engine.solvers.summation import combine, inner
@@ -58,21 +58,21 @@ class TrialSpace:
         A vector that every basis holds: the residual is orthogonal to it.
     """
 
-    lift: NDArray[np.float64]
-    free: NDArray[np.int64]
+    lift: Floats
+    free: Ints
     size: int
-    conserved: NDArray[np.float64]
+    conserved: Floats
 
     @property
     def loads(self) -> int:
         """Number of loads, k."""
         return int(self.lift.shape[1])
 
-    def rows(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rows(self, u: Floats) -> Floats:
         """Rows of free values of shape (size, q), without the lift: shape (rows, q)."""
         return np.concatenate([u, np.zeros((1, u.shape[1]))])[self.free]
 
-    def gather(self, flows: NDArray[np.float64]) -> NDArray[np.float64]:
+    def gather(self, flows: Floats) -> Floats:
         """Sum of the rows of every free value, shape (size, k)."""
         inside = self.free >= 0
         free = self.free[inside]
@@ -94,7 +94,7 @@ class Member:
         Another member in, a c > 0 with K >= c K_0 out, K_0 that member's.
     """
 
-    apply: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    apply: Callable[[Floats], Floats]
     matrix: Callable[[], csr_matrix]
     floor: Callable[[Member], float]
 
@@ -120,8 +120,8 @@ class FamilySolution:
     seconds : float
     """
 
-    u: NDArray[np.float64]
-    energies: NDArray[np.float64]
+    u: Floats
+    energies: Floats
     relative_energy_error: float
     certified: bool
     snapshots: int
@@ -146,11 +146,11 @@ class _Reference:
 class _Basis:
     """Orthonormal vectors, shape (size, q), their rows, and how many snapshots they come from."""
 
-    vectors: NDArray[np.float64]
-    rows: NDArray[np.float64]
+    vectors: Floats
+    rows: Floats
     snapshots: int = 0
 
-    def with_snapshot(self, space: TrialSpace, u: NDArray[np.float64]) -> _Basis:
+    def with_snapshot(self, space: TrialSpace, u: Floats) -> _Basis:
         """The basis that holds u too."""
         vectors = _orthonormal(self.vectors, u)
         return _Basis(vectors, space.rows(vectors), self.snapshots + 1)
@@ -281,7 +281,7 @@ def _reduced(
     return FamilySolution(u, energies, error, reference.proven, basis.snapshots, 0, seconds)
 
 
-def _solve_small(gram: NDArray[np.float64], rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+def _solve_small(gram: Floats, rhs: Floats) -> Floats:
     """Solution of the projected system."""
     return np.asarray(cho_solve(cho_factor(0.5 * (gram + gram.T)), rhs))
 
@@ -327,7 +327,7 @@ def _full(
     return solution, reference
 
 
-def _orthonormal(basis: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _orthonormal(basis: Floats, vectors: Floats) -> Floats:
     """The basis with what the vectors add to it, by Gram-Schmidt done twice."""
     for vector in vectors.T:
         rest = vector[:, None] / (_length(vector[:, None]) or 1.0)
@@ -339,5 +339,5 @@ def _orthonormal(basis: NDArray[np.float64], vectors: NDArray[np.float64]) -> ND
     return basis
 
 
-def _length(vector: NDArray[np.float64]) -> float:
+def _length(vector: Floats) -> float:
     return float(np.sqrt(inner(vector, vector).item()))

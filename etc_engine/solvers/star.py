@@ -15,15 +15,13 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.solvers.amg_cg import Preconditioner, build_preconditioner
 
 
-def star_preconditioner(
-    nodes: NDArray[np.int64], centres: NDArray[np.int64], conductances: NDArray[np.float64], size: int
-) -> Preconditioner:
+def star_preconditioner(nodes: Ints, centres: Ints, conductances: Floats, size: int) -> Preconditioner:
     """Inverse of a sum of stars, exactly where the centres are few, by one V-cycle where they are many.
 
     Parameters
@@ -67,7 +65,7 @@ def star_preconditioner(
     coarse.sort_indices()
     inner = build_preconditioner(coarse)
 
-    def apply(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apply(residual: Floats) -> Floats:
         return np.asarray(residual / totals + spread @ inner.apply(gather @ residual))
 
     return Preconditioner(apply, inner.levels + 1, time.perf_counter() - start)

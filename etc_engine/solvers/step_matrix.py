@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags_array
 from scipy.sparse.csgraph import connected_components
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.solvers.amg_cg import EXACT_LEVEL, Preconditioner, build_preconditioner
 from etc_engine.solvers.summation import dot
@@ -42,10 +43,10 @@ class StepMatrix:
     preconditioner: Preconditioner
     exact: bool
     components: NDArray[np.int32]
-    row_sums: NDArray[np.float64]
+    row_sums: Floats
     tolerance: float
 
-    def solve(self, rhs: NDArray[np.float64], guess: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    def solve(self, rhs: Floats, guess: Floats) -> tuple[Floats, int]:
         """Solution of A x = b from a starting guess, and the iterations it took.
 
         The residual of the answer sums to zero over every component, to round-off: what a component stores is what
@@ -58,7 +59,7 @@ class StepMatrix:
         residual = np.bincount(self.components, rhs - self.matrix @ x, minlength=self.row_sums.size)
         return x + (residual / self.row_sums)[self.components], iterations
 
-    def _iterate(self, rhs: NDArray[np.float64], guess: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    def _iterate(self, rhs: Floats, guess: Floats) -> tuple[Floats, int]:
         x = guess.copy()
         r = rhs - self.matrix @ x
         z = self.preconditioner.apply(r)
@@ -89,7 +90,7 @@ class StepMatrix:
 
 def step_matrix(
     conductance: csr_matrix,
-    capacity: NDArray[np.float64],
+    capacity: Floats,
     rate: float,
     tolerance: float,
     like: StepMatrix | None = None,
@@ -120,5 +121,5 @@ def step_matrix(
     return StepMatrix(matrix, rate, preconditioner, exact, components, row_sums, tolerance)
 
 
-def _largest(values: NDArray[np.float64]) -> float:
+def _largest(values: Floats) -> float:
     return float(np.abs(values).max(initial=0.0))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from etc_engine.arrays import Floats
 
 
-def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+def dot(a: Floats, b: Floats) -> float:
     """Inner product of two vectors of shape (n,).
 
     Examples
@@ -18,18 +19,18 @@ def dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float(inner(a[:, None], b[:, None])[0, 0])
 
 
-def inner(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def inner(a: Floats, b: Floats) -> Floats:
     """Inner products of the columns of two tall matrices, a^T b, shape (q, k)."""
     return np.asarray(_sum_products(np.ascontiguousarray(a), np.ascontiguousarray(b)))
 
 
-def combine(columns: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+def combine(columns: Floats, weights: Floats) -> Floats:
     """Product of a tall and a small matrix, shape (n, a)."""
     return np.asarray(np.einsum("iq,qa->ia", columns, weights))
 
 
 @njit(cache=True)
-def _sum_products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sum_products(a: Floats, b: Floats) -> Floats:
     """Sums over short blocks of rows, four at a time, then over the blocks: fast, and little round-off."""
     rows = a.shape[0]
     total = np.zeros((a.shape[1], b.shape[1]))

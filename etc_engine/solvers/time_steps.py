@@ -10,13 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.solvers.step_matrix import StepMatrix, step_matrix
-
-Vector = NDArray[np.float64]
 
 # stages of the two L-stable one-step schemes of order 2
 SDIRK_GAMMA = 1.0 - np.sqrt(0.5)
@@ -56,11 +54,11 @@ class HeatSystem:
         If the shapes do not fit, or a capacity is negative or not finite.
     """
 
-    capacity: Vector
+    capacity: Floats
     conductance: csr_matrix
-    load: Callable[[float], Vector]
-    heat_rates: Callable[[float, Vector], Vector] | None = None
-    source: Callable[[float], Vector] | None = None
+    load: Callable[[float], Floats]
+    heat_rates: Callable[[float, Floats], Floats] | None = None
+    source: Callable[[float], Floats] | None = None
     knots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -75,22 +73,22 @@ class HeatSystem:
             raise InputError(f"heat capacities must be >= 0 and finite, found {self.capacity[bad]:g} at node {bad}")
 
     @property
-    def stores(self) -> NDArray[np.bool_]:
+    def stores(self) -> Flags:
         """Nodes with a heat capacity."""
         return np.asarray(self.capacity > 0.0)
 
-    def slope(self, t: float, temperatures: Vector) -> Vector:
+    def slope(self, t: float, temperatures: Floats) -> Floats:
         """C dT/dt [W]; zero at the nodes without capacity, whose temperatures must fit."""
         return np.where(self.stores, self.load(t) - self.conductance @ temperatures, 0.0)
 
-    def rates(self, t: float, temperatures: Vector) -> Vector:
+    def rates(self, t: float, temperatures: Floats) -> Floats:
         """Heat flows into the system [W]."""
         if self.heat_rates is None:
             return np.array([(self.load(t) - self.conductance @ temperatures).sum()])
         return np.asarray(self.heat_rates(t, temperatures), dtype=np.float64)
 
 
-def _centred(system: HeatSystem, at: float, middle: float, rates: Vector) -> tuple[Vector | float, Vector]:
+def _centred(system: HeatSystem, at: float, middle: float, rates: Floats) -> tuple[Floats | float, Floats]:
     """What the source in the middle of a step adds to the load at a time of it, and the heat rates with it."""
     if system.source is None:
         return 0.0, rates
@@ -115,8 +113,8 @@ class Step:
         Largest estimated error of the temperatures; NaN where the scheme has no estimate.
     """
 
-    temperatures: Vector
-    heat: Vector
+    temperatures: Floats
+    heat: Floats
     iterations: int
     error: float = np.nan
 
@@ -132,10 +130,10 @@ class AlgebraicRows:
         K_aa.
     """
 
-    rows: NDArray[np.int64]
+    rows: Ints
     inner: StepMatrix
 
-    def fit(self, system: HeatSystem, t: float, temperatures: Vector) -> Vector:
+    def fit(self, system: HeatSystem, t: float, temperatures: Floats) -> Floats:
         """The temperatures with those of the nodes without capacity replaced by what the others make of them."""
         fitted = temperatures.copy()
         if self.rows.size:
@@ -159,7 +157,7 @@ def algebraic_rows(system: HeatSystem, tolerance: float) -> AlgebraicRows:
     return AlgebraicRows(rows, step_matrix(block, np.zeros(block.shape[0]), 0.0, tolerance))
 
 
-def explicit_euler(system: HeatSystem, algebraic: AlgebraicRows, t: float, h: float, old: Vector) -> Step:
+def explicit_euler(system: HeatSystem, algebraic: AlgebraicRows, t: float, h: float, old: Floats) -> Step:
     """C (T' - T) = h (f - K T), the algebraic rows solved at the end; flows by the rectangle at the start.
 
     The source is taken in the middle.
@@ -171,7 +169,7 @@ def explicit_euler(system: HeatSystem, algebraic: AlgebraicRows, t: float, h: fl
     return Step(algebraic.fit(system, t + h, new), h * rates, int(algebraic.rows.size > 0))
 
 
-def backward_euler(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector) -> Step:
+def backward_euler(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Floats) -> Step:
     """(C/h + K) T' = C/h T + f(t + h); flows by the rectangle at the end. The matrix has the rate 1/h.
 
     The source is taken in the middle.
@@ -182,7 +180,7 @@ def backward_euler(system: HeatSystem, matrix: StepMatrix, t: float, h: float, o
     return Step(new, h * rates, iterations)
 
 
-def crank_nicolson(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector) -> Step:
+def crank_nicolson(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Floats) -> Step:
     """(2 C/h + K) T' = (2 C/h - K) T + f(t) + f(t + h); flows by the trapezium. The matrix has the rate 2/h.
 
     Algebraic rows hold at the end of the step instead of on average, so that nothing of them alternates.
@@ -193,7 +191,7 @@ def crank_nicolson(system: HeatSystem, matrix: StepMatrix, t: float, h: float, o
 
 
 def bdf2(
-    system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector, older: Vector, last_heat: Vector
+    system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Floats, older: Floats, last_heat: Floats
 ) -> Step:
     """(3 C/2h + K) T' = C (4 T - T_older)/2h + f(t + h). The matrix has the rate 3/2h.
 
@@ -204,7 +202,7 @@ def bdf2(
     return Step(new, (last_heat + 2.0 * h * system.rates(t + h, new)) / 3.0, iterations)
 
 
-def sdirk2(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector) -> Step:
+def sdirk2(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Floats) -> Step:
     """Alexander's L-stable, stiffly accurate scheme of order 2, the starter of `bdf2`.
 
     With g = 1 - 1/sqrt(2): C (Y - T) = h g F(t + g h, Y), C (T' - T) = h [(1 - g) F(Y) + g F(t + h, T')]. The matrix
@@ -222,7 +220,7 @@ def sdirk2(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vect
     return Step(new, heat, first + second)
 
 
-def tr_bdf2(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Vector) -> Step:
+def tr_bdf2(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Floats) -> Step:
     """Trapezium to t + (2 - sqrt 2) h, then BDF2: L-stable, of order 2, with an estimate of its error.
 
     The estimate is the difference from an embedded scheme of order 3, smoothed by (1 + d h K)^-1 so that stiff

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.packing.particles import ParticlePacking
 
 DEEP = 0.5
@@ -28,9 +28,9 @@ class Filling:
         Particles of which each wall cuts off more than half a radius.
     """
 
-    extent: NDArray[np.float64]
-    free: NDArray[np.float64]
-    deep_cuts: NDArray[np.int64]
+    extent: Floats
+    free: Floats
+    deep_cuts: Ints
 
     @property
     def fill_height(self) -> float:
@@ -64,6 +64,6 @@ def find_filling(packing: ParticlePacking) -> Filling:
     return Filling(extent, np.where(periodic, np.nan, free), np.where(periodic, 0, cut.sum(axis=0)))
 
 
-def free_walls(packing: ParticlePacking, filling: Filling) -> NDArray[np.int64]:
+def free_walls(packing: ParticlePacking, filling: Filling) -> Ints:
     """Walls with room for one more layer of the largest particles in front of them."""
     return np.flatnonzero(filling.free > 2.0 * packing.radii.max())

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import GeometryError
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.clipping import sort_into_grid, tessellate
@@ -44,17 +44,17 @@ class LaguerreFacets:
         Distance of the seed from the wall.
     """
 
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    areas: NDArray[np.float64]
-    centroids: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    volumes: NDArray[np.float64]
-    wall_cells: NDArray[np.int64]
-    walls: NDArray[np.int64]
-    wall_areas: NDArray[np.float64]
-    wall_centroids: NDArray[np.float64]
-    wall_distances: NDArray[np.float64]
+    pairs: Ints
+    shifts: Ints
+    areas: Floats
+    centroids: Floats
+    distances: Floats
+    volumes: Floats
+    wall_cells: Ints
+    walls: Ints
+    wall_areas: Floats
+    wall_centroids: Floats
+    wall_distances: Floats
 
     @property
     def count(self) -> int:

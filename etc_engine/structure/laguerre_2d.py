@@ -13,14 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError
 from etc_engine.structure.polygons import clip_cells, cluster, lasting_sides, match_sides, sort_into_bins
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SAME_VERTEX = 1e-8
 """Vertices closer than this, in units of the mean spacing, are one; sides shorter than it vanish."""
@@ -61,7 +58,7 @@ class LaguerreCells:
 
     starts: Ints
     edges: Ints
-    forward: NDArray[np.bool_]
+    forward: Flags
     vertices: Ints
     corners: Floats
     vertex_count: int
@@ -78,7 +75,7 @@ class LaguerreCells:
         return int(self.gaps.size)
 
     @property
-    def at_wall(self) -> NDArray[np.bool_]:
+    def at_wall(self) -> Flags:
         """Whether an edge lies on a wall, shape (m,)."""
         return np.asarray(self.cells[:, 1] < 0)
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError
 from etc_engine.structure.clipping import (
@@ -51,13 +51,13 @@ class LaguerrePolygons:
     vertices : ndarray, shape (v, 3) [m]
     """
 
-    cells: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    normals: NDArray[np.float64]
-    starts: NDArray[np.int64]
-    corners: NDArray[np.int64]
-    images: NDArray[np.int64]
-    vertices: NDArray[np.float64]
+    cells: Ints
+    shifts: Ints
+    normals: Floats
+    starts: Ints
+    corners: Ints
+    images: Ints
+    vertices: Floats
 
     @property
     def count(self) -> int:
@@ -142,7 +142,7 @@ def _clip_all(seeds, frame, grid, spacing, widest):  # type: ignore[no-untyped-d
     return volumes, who[:found], normals[:found], points[:placed]
 
 
-def laguerre_polygons(centers: NDArray[np.float64], radii: NDArray[np.float64], box: Box) -> LaguerrePolygons:
+def laguerre_polygons(centers: Floats, radii: Floats, box: Box) -> LaguerrePolygons:
     r"""Facets of the power diagram of spheres, as polygons over shared vertices.
 
     .. math:: \mathrm{pow}_i(x) = |x - x_i|^2 - R_i^2
@@ -223,9 +223,7 @@ def laguerre_polygons(centers: NDArray[np.float64], radii: NDArray[np.float64], 
     )
 
 
-def _merge(
-    points: NDArray[np.float64], lengths: NDArray[np.float64], periodic: NDArray[np.bool_], tolerance: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+def _merge(points: Floats, lengths: Floats, periodic: Flags, tolerance: float) -> tuple[Floats, Ints, Ints]:
     """Vertices of the points modulo the box, the vertex of each point, and its image."""
     inside = np.where(periodic, points - np.floor(points / lengths) * lengths, points)
     inside = np.where(periodic & (inside >= lengths), 0.0, inside)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.packing.neighbors import NeighborPairs, neighbor_pairs
@@ -28,11 +28,11 @@ class RadialFunction:
     values : ndarray, shape (bins,)
     """
 
-    distances: NDArray[np.float64]
-    values: NDArray[np.float64]
+    distances: Floats
+    values: Floats
 
 
-def coordination_numbers(packing: ParticlePacking, contacts: NeighborPairs) -> NDArray[np.int64]:
+def coordination_numbers(packing: ParticlePacking, contacts: NeighborPairs) -> Ints:
     """Number of contacts of each particle, shape (n,); a contact with its own image counts twice.
 
     Examples
@@ -44,7 +44,7 @@ def coordination_numbers(packing: ParticlePacking, contacts: NeighborPairs) -> N
     return np.bincount(contacts.pairs.ravel(), minlength=packing.count)
 
 
-def find_rattlers(packing: ParticlePacking, contacts: NeighborPairs) -> NDArray[np.bool_]:
+def find_rattlers(packing: ParticlePacking, contacts: NeighborPairs) -> Flags:
     """Particles that their neighbours cannot hold in place, shape (n,).
 
     A particle with fewer than d + 1 contacts is loose, and does not hold others: removed again and again until
@@ -73,14 +73,14 @@ def find_rattlers(packing: ParticlePacking, contacts: NeighborPairs) -> NDArray[
         kept = fewer
 
 
-def contact_directions(packing: ParticlePacking, contacts: NeighborPairs) -> NDArray[np.float64]:
+def contact_directions(packing: ParticlePacking, contacts: NeighborPairs) -> Floats:
     """Unit vectors from particle i to its neighbour j, shape (m, d)."""
     i, j = contacts.pairs.T
     branch = packing.centers[j] + contacts.shifts * np.asarray(packing.box.lengths) - packing.centers[i]
     return np.asarray(branch / np.linalg.norm(branch, axis=1, keepdims=True))
 
 
-def fabric_tensor(packing: ParticlePacking, contacts: NeighborPairs) -> NDArray[np.float64]:
+def fabric_tensor(packing: ParticlePacking, contacts: NeighborPairs) -> Floats:
     r"""Contact-fabric tensor, shape (d, d).
 
     .. math:: F = \frac{1}{N_c} \sum_c n_c \otimes n_c
@@ -109,7 +109,7 @@ def fabric_tensor(packing: ParticlePacking, contacts: NeighborPairs) -> NDArray[
     return np.asarray(n.T @ n / len(n))
 
 
-def contact_half_angles(packing: ParticlePacking) -> NDArray[np.float64]:
+def contact_half_angles(packing: ParticlePacking) -> Floats:
     r"""Half-angles of the contacts of overlapping particles, on both sides, shape (m, 2) [rad].
 
     .. math:: \cos\alpha_i = (d^2 + R_i^2 - R_j^2) / (2 d R_i)
@@ -238,7 +238,7 @@ def two_point_probability(packing: ParticlePacking, farthest: float, pixels: int
     return RadialFunction(step * np.arange(sums.size, dtype=np.float64), np.asarray(sums / pairs, dtype=np.float64))
 
 
-def _window(box: Box, distances: NDArray[np.float64]) -> NDArray[np.float64]:
+def _window(box: Box, distances: Floats) -> Floats:
     """Part of the box that stays inside when shifted by a distance, averaged over directions."""
     turn = (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
     if box.dimension == 2:
@@ -256,7 +256,7 @@ def _window(box: Box, distances: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(part.mean(axis=1))
 
 
-def _draw(packing: ParticlePacking, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def _draw(packing: ParticlePacking, shape: tuple[int, ...]) -> Flags:
     """The union of the particles at the middles of a grid's cells."""
     full = np.array((*shape, *(1,) * (3 - len(shape))))
     lengths = np.array((*packing.box.lengths, *(1.0,) * (3 - len(shape))))

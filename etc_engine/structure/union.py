@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
@@ -97,7 +97,7 @@ def solid_fraction(packing: ParticlePacking) -> float:
     return union / packing.box.volume
 
 
-def particle_cuts(packing: ParticlePacking) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def particle_cuts(packing: ParticlePacking) -> tuple[Ints, Floats, Floats]:
     """Half-spaces ``normal . p <= cut`` about the centres: the walls, and the radical planes of overlapping particles.
 
     Parameters

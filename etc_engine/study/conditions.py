@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 from etc_engine.materials import find_solid, gas_state
 from etc_engine.medium.conditions import Conditions
@@ -15,7 +15,7 @@ from etc_engine.medium.conditions import Conditions
 if TYPE_CHECKING:
     from etc_engine.study.sweep import Study
 
-Derived = dict[str, tuple[tuple[str, ...], NDArray[np.float64]]]
+Derived = dict[str, tuple[tuple[str, ...], Floats]]
 
 
 def check_conditions(study: Study) -> None:
@@ -72,7 +72,7 @@ def derived_conductivities(study: Study) -> Derived:
 
 def _over(
     study: Study, place: str, names: tuple[str, ...], value: Callable[..., float]
-) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+) -> tuple[tuple[str, ...], Floats]:
     """Values over every combination, along the dimensions with a list."""
     grids = np.meshgrid(*(study.values(name) for name in names), indexing="ij")
     try:

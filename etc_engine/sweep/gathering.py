@@ -7,9 +7,7 @@ from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from etc_engine.arrays import Ints
 from etc_engine.errors import OutputError
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.scheduler import Communicator, on_rank_zero
@@ -54,7 +52,7 @@ class Gatherer:
             self.damaged = sum(damaged for _, damaged in parts)
         return self._table
 
-    def gather_all(self, units: NDArray[np.int64], written: Path | None = None) -> Table:
+    def gather_all(self, units: Ints, written: Path | None = None) -> Table:
         """The same, once it has the units of a round, which all ranks have written.
 
         Raises
@@ -73,7 +71,7 @@ class Gatherer:
     def _files(self, written: Iterable[Path | None] | None) -> list[Path]:
         return self._reader.files(path for path in written or () if path is not None)
 
-    def _missing(self, table: Table, units: NDArray[np.int64], deadline: float) -> int:
+    def _missing(self, table: Table, units: Ints, deadline: float) -> int:
         there = {tuple(unit) for unit in table.units.tolist()}
         missing = [unit for unit in units.tolist() if tuple(unit) not in there]
         if missing and time.monotonic() > deadline:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.realization import Status
 from etc_engine.sweep.statistics import interval
 
@@ -71,9 +72,7 @@ def stream_fingerprint(seed: int, unit: Unit) -> int:
     return int(unit_seed(seed, unit).generate_state(1, np.uint64)[0])
 
 
-def units_to_run(
-    densities: Sequence[float | None], targets: Sequence[int], finished: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def units_to_run(densities: Sequence[float | None], targets: Sequence[int], finished: Ints) -> Ints:
     """Units of all densities up to their targets that are not finished, the costliest first.
 
     A unit costs what its particles cost, and their number grows with the density. With the large units
@@ -102,7 +101,7 @@ def units_to_run(
 
 
 def needed_realizations(
-    samples: Sequence[float] | NDArray[np.float64], realized: int, relative_ci: float, confidence: float, cap: int
+    samples: Sequence[float] | Floats, realized: int, relative_ci: float, confidence: float, cap: int
 ) -> int:
     r"""How many realizations a cell needs for :math:`t\,s/\sqrt{n} \le \epsilon\,|\bar k|`.
 
@@ -174,7 +173,7 @@ def next_targets(study: Study, targets: Sequence[int], table: Table) -> tuple[in
     return tuple(grown)
 
 
-def _samples(rows: NDArray[Any]) -> Iterator[NDArray[np.float64]]:
+def _samples(rows: NDArray[Any]) -> Iterator[Floats]:
     """Valid conductivities of each cell and each direction that has one."""
     *cells, d, _ = rows.dtype["conductivity"].shape
     for place in np.ndindex(*cells):

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 
@@ -22,11 +23,11 @@ class Summary:
     """
 
     count: int
-    mean: NDArray[np.float64]
-    std: NDArray[np.float64]
-    sem: NDArray[np.float64]
-    ci_low: NDArray[np.float64]
-    ci_high: NDArray[np.float64]
+    mean: Floats
+    std: Floats
+    sem: Floats
+    ci_low: Floats
+    ci_high: Floats
 
 
 def student_t(confidence: float, count: int) -> float:
@@ -42,12 +43,12 @@ def student_t(confidence: float, count: int) -> float:
     return float(stdtrit(count - 1, 0.5 * (1.0 + confidence)))
 
 
-def half_width(samples: NDArray[np.float64], confidence: float) -> float:
+def half_width(samples: Floats, confidence: float) -> float:
     """Half-width of the confidence interval of the mean of at least two samples, shape (n,)."""
     return student_t(confidence, samples.size) * float(np.std(samples, ddof=1)) / float(np.sqrt(samples.size))
 
 
-def summarize(samples: NDArray[np.float64], confidence: float) -> Summary:
+def summarize(samples: Floats, confidence: float) -> Summary:
     r"""Mean, spread and Student-t interval over the first axis.
 
     .. math:: \bar k \pm t_{n-1,(1+c)/2}\, s/\sqrt{n}
@@ -233,7 +234,7 @@ def wilson(successes: int, trials: int, confidence: float) -> tuple[float, float
     return float(max(low, 0.0)), float(min(high, 1.0))
 
 
-def _student(values: NDArray[np.float64], confidence: float) -> tuple[float, float, float]:
+def _student(values: Floats, confidence: float) -> tuple[float, float, float]:
     """Mean and Student-t bounds; NaN where there are too few values."""
     if values.size == 0:
         return np.nan, np.nan, np.nan

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.realization import Outcome, Status
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.plan import stream_fingerprint
@@ -88,7 +89,7 @@ class Table:
     messages: dict[tuple[int, int, int], str] = field(default_factory=dict)
 
     @property
-    def units(self) -> NDArray[np.int64]:
+    def units(self) -> Ints:
         """Density index and realization of each row, shape (n, 2)."""
         return np.column_stack((self.rows["density_index"], self.rows["realization"]))
 
@@ -139,7 +140,7 @@ def tabulate(study: Study, records: Iterable[Record]) -> Table:
     return join([Table(rows, messages)])
 
 
-def _known(cell: Outcome, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _known(cell: Outcome, values: Any, shape: tuple[int, ...]) -> Floats:
     """The values of a cell that has any; a failed one has none, whatever it stands for them."""
     if values is None or cell.status > Status.NOT_PERCOLATING:
         return np.full(shape, np.nan)

@@ -14,10 +14,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 from scipy.sparse.csgraph import connected_components
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.walls import WALLS, FixedTemperature
@@ -31,7 +32,7 @@ WINDOW = (0.2, 0.95)
 """Mean temperatures that are fitted: the front has passed the wall's particles, and something is left to happen."""
 
 
-def slab_mean(fourier: ArrayLike) -> NDArray[np.float64]:
+def slab_mean(fourier: ArrayLike) -> Floats:
     """Mean temperature of a slab after a unit step at one wall, the other insulated.
 
     Parameters
@@ -132,8 +133,8 @@ class Diffusivity:
     steady: float
     conductivity: float
     heat_capacity: float
-    times: NDArray[np.float64]
-    means: NDArray[np.float64]
+    times: Floats
+    means: Floats
 
 
 def effective_diffusivity(

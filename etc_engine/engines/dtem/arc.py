@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.element import DiskContacts, Resistances, disk_contacts, packed_starts
 from etc_engine.medium.sides import ContactSides
 
@@ -24,7 +24,7 @@ POINTS = 32
 """Gauss-Chebyshev points of an arc."""
 
 
-def arc_resistances(sides: ContactSides, conductivity: NDArray[np.float64], modes: int = MODES) -> Resistances:
+def arc_resistances(sides: ContactSides, conductivity: Floats, modes: int = MODES) -> Resistances:
     """Resistance matrices H of all disks over (contact, mode).
 
     H_(ik)(jl) = -1/(pi kappa) int int w_k(s) w_l(t) ln |sin((theta_i + alpha_i s - theta_j - alpha_j t)/2)| ds dt,
@@ -53,14 +53,14 @@ def arc_resistances(sides: ContactSides, conductivity: NDArray[np.float64], mode
     return Resistances(modes, starts, values, moments.reshape(-1, 2))
 
 
-def _quadrature(modes: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _quadrature(modes: int) -> tuple[Floats, Floats]:
     """Gauss-Chebyshev points, and T_k at them over their number, shape (modes, points)."""
     angle = (np.arange(POINTS) + 0.5) * np.pi / POINTS
     return np.cos(angle), np.cos(np.arange(modes)[:, None] * angle) / POINTS
 
 
 @njit(cache=True)
-def _project(kernel: NDArray[np.float64], weights: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+def _project(kernel: Floats, weights: Floats, out: Floats) -> None:
     """Moments of a kernel at the Gauss points over the modes of both arcs."""
     modes, number = weights.shape
     for k in range(modes):
@@ -77,10 +77,10 @@ def _block(
     separation: float,
     a: float,
     b: float,
-    points: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    kernel: NDArray[np.float64],
-    out: NDArray[np.float64],
+    points: Floats,
+    weights: Floats,
+    kernel: Floats,
+    out: Floats,
 ) -> None:
     """Kappa H over the modes of two different arcs."""
     number = points.size
@@ -93,10 +93,10 @@ def _block(
 @njit(cache=True)
 def _own_block(
     a: float,
-    points: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    kernel: NDArray[np.float64],
-    out: NDArray[np.float64],
+    points: Floats,
+    weights: Floats,
+    kernel: Floats,
+    out: Floats,
 ) -> None:
     """Kappa H over the modes of one arc."""
     number = points.size
@@ -113,10 +113,10 @@ def _own_block(
 @njit(cache=True)
 def _fill(
     disks: DiskContacts,
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
-    points: NDArray[np.float64],
-    weights: NDArray[np.float64],
+    starts: Ints,
+    values: Floats,
+    points: Floats,
+    weights: Floats,
 ) -> None:
     """H_(ik)(jl) of every disk: the block of two arcs over kappa, odd modes mirrored, and R_c on the diagonal."""
     modes = weights.shape[0]

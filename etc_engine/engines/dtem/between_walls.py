@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.facet_elements import FacetMaterial
 from etc_engine.engines.dtem.facet_medium import medium_links, medium_material
 from etc_engine.engines.dtem.facet_nonlinear import NonlinearSolution, solve_nonlinear
 from etc_engine.medium.conditions import Conditions, pores_at
 from etc_engine.medium.medium import Medium
 
-Floats = NDArray[np.float64]
 NODES = 65
 """Temperatures between the walls at which the properties of the pores are evaluated."""
 

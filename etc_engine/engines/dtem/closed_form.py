@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.element import Resistances, contact_potentials, packed_starts
 from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.sides import ContactSides
@@ -13,11 +13,11 @@ from etc_engine.medium.sides import ContactSides
 
 def closed_form_resistances(
     sides: ContactSides,
-    conductivity: NDArray[np.float64],
+    conductivity: Floats,
     modes: int = 1,
     *,
     method: str,
-    cutting: NDArray[np.bool_] | None = None,
+    cutting: Flags | None = None,
 ) -> Resistances:
     """Resistance matrices H of all disks or spheres in closed form.
 
@@ -49,9 +49,7 @@ def closed_form_resistances(
     return Resistances(modes, starts, values, law.moments(sides.arms, sides.alpha))
 
 
-def closed_form_potentials(
-    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64], *, method: str
-) -> NDArray[np.float64]:
+def closed_form_potentials(sides: ContactSides, conductivity: Floats, flows: Floats, *, method: str) -> Floats:
     """Temperature of every contact above its particle's mean; only contacts with a flux of (s, 1) cut the particle."""
     h = closed_form_resistances(sides, conductivity, method=method, cutting=flows[:, 0] != 0.0)
     return contact_potentials(h, sides, flows)
@@ -59,11 +57,11 @@ def closed_form_potentials(
 
 @njit(cache=True)
 def _scale(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    scales: NDArray[np.float64],
-    resistance: NDArray[np.float64],
-    values: NDArray[np.float64],
+    offsets: Ints,
+    starts: Ints,
+    scales: Floats,
+    resistance: Floats,
+    values: Floats,
 ) -> None:
     """H_ij = values_ij/scale + delta_ij R_i, in place."""
     for p in range(offsets.size - 1):

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.angle_curve import solve_angle_curve
 from etc_engine.engines.dtem.exact.bounds import energy_bounds
 from etc_engine.engines.dtem.exact.spheres import DEGREE
@@ -104,7 +104,7 @@ def _fewer_modes(
     return float(np.abs(before[after > 0.0] / after[after > 0.0] - 1.0).max(initial=0.0))
 
 
-def conductivity_bounds(result: EffectiveConductivity[SteadySolution]) -> NDArray[np.float64]:
+def conductivity_bounds(result: EffectiveConductivity[SteadySolution]) -> Floats:
     """Two-sided bounds of the diagonal of the conductivity tensor by method ``exact``, shape (d, 2) [W/(m K)].
 
     Lower and upper bound along each axis; NaN where it was not asked for.

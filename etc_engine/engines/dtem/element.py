@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import GeometryError
 from etc_engine.laws.disk import position_angles
 from etc_engine.medium.sides import ContactSides
@@ -39,15 +39,15 @@ class DiskContacts(NamedTuple):
     conductivity : ndarray, shape (n,) [W/(m K)]
     """
 
-    offsets: NDArray[np.int64]
-    theta: NDArray[np.float64]
-    alpha: NDArray[np.float64]
-    signs: NDArray[np.float64]
-    resistances: NDArray[np.float64]
-    conductivity: NDArray[np.float64]
+    offsets: Ints
+    theta: Floats
+    alpha: Floats
+    signs: Floats
+    resistances: Floats
+    conductivity: Floats
 
 
-def disk_contacts(sides: ContactSides, conductivity: NDArray[np.float64]) -> DiskContacts:
+def disk_contacts(sides: ContactSides, conductivity: Floats) -> DiskContacts:
     """Contact sides of disks with their position angles."""
     return DiskContacts(
         sides.offsets,
@@ -81,12 +81,12 @@ class Elements:
     """
 
     modes: int
-    offsets: NDArray[np.int64]
-    nodes: NDArray[np.int64]
-    starts: NDArray[np.int64]
-    values: NDArray[np.float64]
+    offsets: Ints
+    nodes: Ints
+    starts: Ints
+    values: Floats
 
-    def apply(self, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apply(self, temperatures: Floats) -> Floats:
         """Heat flows K_e T_e into every element, shape (rows, k), for row temperatures of that shape."""
         return _apply(self.offsets, self.starts, self.values, np.ascontiguousarray(temperatures))
 
@@ -108,16 +108,16 @@ class Resistances(NamedTuple):
     """
 
     modes: int
-    starts: NDArray[np.int64]
-    values: NDArray[np.float64]
-    moments: NDArray[np.float64]
+    starts: Ints
+    values: Floats
+    moments: Floats
 
 
 LARGEST_ELEMENT = 2000
 """Rows of the matrix of one particle (contacts times modes): its factor costs their cube, ten seconds at this size."""
 
 
-def packed_starts(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
+def packed_starts(offsets: Ints) -> Ints:
     """Where each square matrix begins in a packed array, for elements of ``offsets[p + 1] - offsets[p]`` rows.
 
     Raises
@@ -151,9 +151,7 @@ def condensed_elements(resistances: Resistances, sides: ContactSides) -> Element
     return Elements(modes, offsets, nodes, resistances.starts, values)
 
 
-def contact_potentials(
-    resistances: Resistances, sides: ContactSides, flows: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def contact_potentials(resistances: Resistances, sides: ContactSides, flows: Floats) -> Floats:
     """Temperature of every contact above its particle's mean, sum_j h_ij Q_j, shape (s,).
 
     Parameters
@@ -206,10 +204,10 @@ def smallest_ratio(elements: Elements, reference: Elements) -> float:
 
 @njit(cache=True)
 def _largest_ratio(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    upper: NDArray[np.float64],
-    lower: NDArray[np.float64],
+    offsets: Ints,
+    starts: Ints,
+    upper: Floats,
+    lower: Floats,
     modes: int,
     widest: int,
 ) -> float:
@@ -248,11 +246,11 @@ def _largest_ratio(
 
 @njit(cache=True)
 def _condense_all(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    resistances: NDArray[np.float64],
+    offsets: Ints,
+    starts: Ints,
+    resistances: Floats,
     modes: int,
-    values: NDArray[np.float64],
+    values: Floats,
 ) -> int:
     """Condense every disk of at least two contacts; returns the first that has no inverse, or -1."""
     for p in range(offsets.size - 1):
@@ -266,9 +264,7 @@ def _condense_all(
 
 
 @njit(cache=True)
-def condense(
-    h: NDArray[np.float64], size: int, modes: int, work: NDArray[np.float64], out: NDArray[np.float64]
-) -> bool:
+def condense(h: Floats, size: int, modes: int, work: Floats, out: Floats) -> bool:
     """K_e = P (P^T H P)^{-1} P^T of one element, row by row into ``out``.
 
     ``h[:size, :size]`` is H; rows ``0, modes, 2 modes, ...`` carry the heat flows that sum to zero, the first row
@@ -319,7 +315,7 @@ def condense(
 
 
 @njit(cache=True)
-def cholesky_inverse(a: NDArray[np.float64], m: int) -> bool:
+def cholesky_inverse(a: Floats, m: int) -> bool:
     """Invert ``a[:m, :m]`` in place, given its lower triangle; False if it is not positive definite."""
     for j in range(m):
         pivot = a[j, j]
@@ -354,11 +350,11 @@ def cholesky_inverse(a: NDArray[np.float64], m: int) -> bool:
 
 @njit(cache=True)
 def _apply(
-    offsets: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
-    temperatures: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    offsets: Ints,
+    starts: Ints,
+    values: Floats,
+    temperatures: Floats,
+) -> Floats:
     flows = np.zeros_like(temperatures)
     for p in range(offsets.size - 1):
         first, n = offsets[p], offsets[p + 1] - offsets[p]

@@ -19,9 +19,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.element import Elements
 from etc_engine.engines.dtem.facet_elements import (
     FacetMaterial,
@@ -61,7 +61,7 @@ class FamilyMember:
         Full sets of matrices behind it.
     """
 
-    energies: NDArray[np.float64]
+    energies: Floats
     relative_error: float
     solution: FacetSolution | None
     anchors: int
@@ -148,7 +148,7 @@ def _solve_alike(
 
 def _choose_anchors(
     links: FacetLinks, materials: Sequence[FacetMaterial], sides: FacetSides, accuracy: float
-) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[list[int], Floats, Floats]:
     """Rows of the anchors, coefficients c_s of every material, shape (anchors, materials), and what the fit leaves.
 
     All materials are anchors where a sample would not pay.
@@ -174,16 +174,14 @@ def _choose_anchors(
     return everyone
 
 
-def _reduced_products(
-    lift: NDArray[np.float64], solutions: Sequence[FacetSolution], elements: Sequence[Elements]
-) -> NDArray[np.float64]:
+def _reduced_products(lift: Floats, solutions: Sequence[FacetSolution], elements: Sequence[Elements]) -> Floats:
     """B^T K_s B of every anchor s, shape (anchors, r, r): B is the lift, and an orthonormal basis of the rest."""
     beyond = np.concatenate([solution.temperatures - lift for solution in solutions], axis=1)
     basis = np.concatenate([lift, np.linalg.qr(beyond)[0]], axis=1)
     return np.array([basis.T @ own.apply(basis) for own in elements])
 
 
-def _least_energy(products: NDArray[np.float64], loads: int, size: int) -> NDArray[np.float64]:
+def _least_energy(products: Floats, loads: int, size: int) -> Floats:
     """Energies of the loads, least over the first ``size`` vectors of the basis."""
     inner, cross = products[loads:size, loads:size], products[loads:size, :loads]
     y = np.linalg.lstsq(inner, -cross, rcond=1e-14)[0]

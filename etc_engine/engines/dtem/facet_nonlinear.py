@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.facet_elements import FacetMaterial
 from etc_engine.engines.dtem.facet_steady import FacetSolution, solve_facets
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.medium.facets import FacetLinks
 
-Floats = NDArray[np.float64]
 MaterialAt = Callable[[Floats, Floats], FacetMaterial]
 """Material from the temperatures [K] of the spheres, shape (n,), and of the links, shape (m + w,)."""
 

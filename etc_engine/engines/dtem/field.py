@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.interior import temperatures_inside
 from etc_engine.engines.dtem.methods import find_method
 from etc_engine.engines.dtem.sphere_interior import temperatures_inside_spheres
@@ -56,8 +56,8 @@ def recover_field(solution: SteadySolution, load: int = 0) -> ParticleField:
     total = np.bincount(owner, solution.temperatures[:, load] - potentials[rows], minlength=packing.count)
     temperatures = np.full(packing.count, np.nan, dtype=np.float64)
     temperatures[number > 0] = total[number > 0] / number[number > 0]
-    at_wall: NDArray[np.float64] = np.full(network.walls.size, np.nan)
-    jumps: NDArray[np.float64] = np.zeros(network.count)
+    at_wall: Floats = np.full(network.walls.size, np.nan)
+    jumps: Floats = np.zeros(network.count)
     if periodic:
         temperatures = np.asarray(temperatures + packing.centers[:, axis])
         jumps = (network.shifts[:, axis] * packing.box.lengths[axis]).astype(np.float64)

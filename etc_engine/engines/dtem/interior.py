@@ -18,8 +18,8 @@ import math
 import numpy as np
 from numba import njit
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.element import DiskContacts, disk_contacts
 from etc_engine.engines.dtem.exact.field import exact_temperatures
 from etc_engine.engines.dtem.methods import find_method
@@ -30,9 +30,7 @@ _LEGENDRE = leggauss(_POINTS)[0], 0.5 * leggauss(_POINTS)[1]
 _CHEBYSHEV = np.cos((np.arange(_POINTS) + 0.5) * np.pi / _POINTS), np.full(_POINTS, 1.0 / _POINTS)
 
 
-def temperatures_inside(
-    field: ParticleField, method: str, particles: NDArray[np.int64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def temperatures_inside(field: ParticleField, method: str, particles: Ints, points: Floats) -> Floats:
     """Temperature at points inside particles.
 
     Parameters
@@ -81,13 +79,13 @@ def temperatures_inside(
 @njit(cache=True)
 def _evaluate(
     disks: DiskContacts,
-    particles: NDArray[np.int64],
-    points: NDArray[np.float64],
-    flows: NDArray[np.float64],
+    particles: Ints,
+    points: Floats,
+    flows: Floats,
     uniform: bool,
-    nodes: NDArray[np.float64],
-    weights: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    nodes: Floats,
+    weights: Floats,
+) -> Floats:
     """Temperature above the particle's mean at every point, given in radii: the sum of the module's equation."""
     theta, alpha, signs = disks.theta, disks.alpha, disks.signs
     values = np.zeros(particles.size)
@@ -124,9 +122,7 @@ def _evaluate(
 
 
 @njit(cache=True)
-def _smooth_mode(
-    k: int, alpha: float, sigma: complex, nodes: NDArray[np.float64], weights: NDArray[np.float64]
-) -> float:
+def _smooth_mode(k: int, alpha: float, sigma: complex, nodes: Floats, weights: Floats) -> float:
     """Part of mode k in the smooth term ln|sin(x)/x|."""
     value = 0.0
     for u in range(nodes.size):

@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-from numpy.typing import NDArray
-
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem import arc
 from etc_engine.engines.dtem.arc import arc_resistances
 from etc_engine.engines.dtem.closed_form import closed_form_potentials, closed_form_resistances
@@ -21,7 +19,7 @@ from etc_engine.laws.by_dimension import LAWS
 from etc_engine.laws.sphere_modes import number_of_modes
 from etc_engine.medium.sides import ContactSides
 
-MakeResistances = Callable[[ContactSides, NDArray[np.float64], int], Resistances]
+MakeResistances = Callable[[ContactSides, Floats, int], Resistances]
 """(sides, conductivity of each particle, modes) -> resistance matrices."""
 
 
@@ -50,8 +48,8 @@ class Variant:
         ``modes`` -> how many modes that are.
     """
 
-    elements: Callable[[ContactSides, NDArray[np.float64], int], Elements]
-    potentials: Callable[[ContactSides, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+    elements: Callable[[ContactSides, Floats, int], Elements]
+    potentials: Callable[[ContactSides, Floats, Floats], Floats]
     modes: int
     uniform_flux: bool
     exact_cuts: bool = False
@@ -60,14 +58,12 @@ class Variant:
     count: Callable[[int], int] = int
 
 
-def _elements_of(make: MakeResistances, sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
+def _elements_of(make: MakeResistances, sides: ContactSides, conductivity: Floats, modes: int) -> Elements:
     """Elements that follow from resistance matrices."""
     return condensed_elements(make(sides, conductivity, modes), sides)
 
 
-def _arc_potentials(
-    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _arc_potentials(sides: ContactSides, conductivity: Floats, flows: Floats) -> Floats:
     return contact_potentials(arc_resistances(sides, conductivity, flows.shape[1]), sides, flows)
 
 

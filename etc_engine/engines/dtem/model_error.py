@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.element import DiskContacts, disk_contacts
 from etc_engine.engines.dtem.sphere_error import sphere_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution
@@ -36,7 +36,7 @@ LEAST = 0.002
 """What sin^4 alpha is multiplied with, averaged over the contacts with their heat flows."""
 
 
-def chord_error_terms(solution: SteadySolution, load: int = 0) -> NDArray[np.float64]:
+def chord_error_terms(solution: SteadySolution, load: int = 0) -> Floats:
     """S, M and J over the energy, shape (3,).
 
     Parameters
@@ -55,7 +55,7 @@ def chord_error_terms(solution: SteadySolution, load: int = 0) -> NDArray[np.flo
     return np.append(terms, _slope_term(sides, kappa, slopes)) / energy
 
 
-def _slope_term(sides: ContactSides, kappa: NDArray[np.float64], slopes: NDArray[np.float64]) -> float:
+def _slope_term(sides: ContactSides, kappa: Floats, slopes: Floats) -> float:
     """J: an isothermal wall counts as a mirror image of infinite conductivity."""
     own = kappa[sides.particles]
     a, b = own[sides.of_contacts].T
@@ -115,7 +115,7 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
 
 
 @njit(cache=True)
-def _terms(disks: DiskContacts, flows: NDArray[np.float64], slopes: NDArray[np.float64]) -> tuple[float, float]:
+def _terms(disks: DiskContacts, flows: Floats, slopes: Floats) -> tuple[float, float]:
     """S and M; the slopes G a of all sides into ``slopes``."""
     segments, moments = 0.0, 0.0
     theta, alpha, kappa = disks.theta, disks.alpha, disks.conductivity

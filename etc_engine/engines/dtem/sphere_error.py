@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.laws.sphere_dents import neumann_slope
 from etc_engine.medium.sides import ContactSides
 
@@ -29,9 +29,7 @@ ALLOWANCE = 2.5
 other four have errors below .02 %), and is 2.5 times the error in the median."""
 
 
-def crossing_and_crowding(
-    sides: ContactSides, kappa: NDArray[np.float64], flows: NDArray[np.float64], energy: float
-) -> tuple[float, float]:
+def crossing_and_crowding(sides: ContactSides, kappa: Floats, flows: Floats, energy: float) -> tuple[float, float]:
     """J, and the mean sum of sixth powers.
 
     Parameters
@@ -58,9 +56,7 @@ def crossing_and_crowding(
     return float(4.0 / 3.0 * crossing / energy), float(powers / total)
 
 
-def sphere_error_estimate(
-    sides: ContactSides, kappa: NDArray[np.float64], flows: NDArray[np.float64], energy: float
-) -> float:
+def sphere_error_estimate(sides: ContactSides, kappa: Floats, flows: Floats, energy: float) -> float:
     """Estimated relative error of the conductivity of spheres by method ``chord``, in magnitude.
 
     2.5 (J + 0.011 <sum_j [(a_i + a_j)/gamma_ij]^6>).
@@ -87,12 +83,12 @@ def sphere_error_estimate(
 
 @njit(cache=True)
 def _slopes(
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    scales: NDArray[np.float64],
-    slopes: NDArray[np.float64],
+    offsets: Ints,
+    normals: Floats,
+    alpha: Floats,
+    flows: Floats,
+    scales: Floats,
+    slopes: Floats,
 ) -> float:
     """G of all sides; returns sum_i |Q_i| sum_j [(a_i + a_j)/gamma_ij]^6."""
     total = 0.0

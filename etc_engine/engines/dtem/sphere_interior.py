@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.laws.sphere_field import sphere_temperatures
 from etc_engine.medium.field import ParticleField
 
 
-def temperatures_inside_spheres(
-    field: ParticleField, method: str, particles: NDArray[np.int64], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def temperatures_inside_spheres(field: ParticleField, method: str, particles: Ints, points: Floats) -> Floats:
     """Temperature at points inside spheres.
 
     Parameters

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats
 from etc_engine.engines.dtem.assembly import assemble, count_positive_off_diagonals
 from etc_engine.engines.dtem.methods import Variant, find_method, flux_modes
 from etc_engine.medium.backbone import Backbone, find_backbone, restore_dead_ends
@@ -53,9 +53,9 @@ class SteadySolution:
     backbone: Backbone
     sides: ContactSides
     method: str
-    temperatures: NDArray[np.float64]
-    flows: NDArray[np.float64]
-    energies: NDArray[np.float64]
+    temperatures: Floats
+    flows: Floats
+    energies: Floats
     reports: tuple[SolveReport, ...]
     positive_off_diagonals: int
 
@@ -70,7 +70,7 @@ class SteadySolution:
         return int(self.flows.shape[1])
 
     @property
-    def heat_flows(self) -> NDArray[np.float64]:
+    def heat_flows(self) -> Floats:
         """Heat flow into the particle at each side, shape (s, k) [W/m]."""
         return self.flows[:, 0, :]
 
@@ -104,12 +104,12 @@ class ElementGeometry:
 
     variant: Variant
     modes: int
-    conductivity: NDArray[np.float64]
+    conductivity: Floats
     backbone: Backbone
     sides: ContactSides
     every_side: ContactSides | None
-    lift: NDArray[np.float64]
-    prescribed: NDArray[np.bool_]
+    lift: Floats
+    prescribed: Flags
 
 
 def element_geometry(

@@ -60,22 +60,22 @@ from collections.abc import Mapping
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.element import Elements, Resistances, cholesky_inverse, packed_starts
 from etc_engine.engines.dtem.methods import find_method, flux_modes
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.sides import ContactSides
 
-SIMPLEX: Mapping[int, NDArray[np.float64]] = {
+SIMPLEX: Mapping[int, Floats] = {
     2: np.stack([np.cos(2.0 * np.pi * np.arange(3) / 3.0), np.sin(2.0 * np.pi * np.arange(3) / 3.0)]),
     3: np.array([[1.0, 1.0, -1.0, -1.0], [1.0, -1.0, 1.0, -1.0], [1.0, -1.0, -1.0, 1.0]]) / np.sqrt(3.0),
 }
 """Directions of the parts of a particle, shape (d, d + 1)."""
 
 
-def readings_of_parts(dimension: int) -> NDArray[np.float64]:
+def readings_of_parts(dimension: int) -> Floats:
     """(T_o, D) of the temperatures of the d + 1 parts of a particle, shape (d + 1, d + 1)."""
     parts = dimension + 1
     slope = np.sqrt(dimension * (dimension + 2.0)) / parts
@@ -84,7 +84,7 @@ def readings_of_parts(dimension: int) -> NDArray[np.float64]:
 
 def storing_elements(
     sides: ContactSides,
-    conductivity: NDArray[np.float64],
+    conductivity: Floats,
     method: str,
     *,
     dipoles: bool = False,
@@ -131,9 +131,9 @@ def storing_elements(
 
 def with_states(
     h: Resistances,
-    contact_offsets: NDArray[np.int64],
-    contact_nodes: NDArray[np.int64],
-    scales: NDArray[np.float64],
+    contact_offsets: Ints,
+    contact_nodes: Ints,
+    scales: Floats,
     dimension: int,
     *,
     dipoles: bool,
@@ -195,13 +195,13 @@ def _indefinite(particle: int, sides: ContactSides, method: str, dipoles: bool) 
 
 @njit(cache=True)
 def _fill(
-    offsets: NDArray[np.int64],
+    offsets: Ints,
     h: Resistances,
-    scales: NDArray[np.float64],
+    scales: Floats,
     constants: tuple[float, float, float],
-    readings: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
+    readings: Floats,
+    starts: Ints,
+    values: Floats,
 ) -> int:
     """Fill the packed matrices; returns the first particle without a positive definite one, or -1.
 
@@ -235,11 +235,11 @@ def _fill(
 
 @njit(cache=True)
 def _join(
-    a: NDArray[np.float64],
-    g: NDArray[np.float64],
-    readings: NDArray[np.float64],
+    a: Floats,
+    g: Floats,
+    readings: Floats,
     relaxation: float,
-    out: NDArray[np.float64],
+    out: Floats,
 ) -> None:
     """The element [A, -A G; -G^T A, G^T A G + W^T w W], row by row into ``out``; W reads the dipoles."""
     n, states = g.shape

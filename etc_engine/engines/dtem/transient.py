@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.assembly import assemble
 from etc_engine.engines.dtem.storage import readings_of_parts, storing_elements
 from etc_engine.medium.medium import Medium, check_conductors
@@ -33,7 +33,7 @@ def element_system(
     dipoles: bool = False,
     modes: int | None = None,
     source: Source = 0.0,
-    capacities: NDArray[np.float64] | None = None,
+    capacities: Floats | None = None,
 ) -> ParticleSystem:
     """Storing elements of all particles, assembled, with the conditions at the walls of the box.
 
@@ -107,7 +107,7 @@ def element_system(
     whole = assemble(elements, np.zeros((elements.nodes.size, 0)), np.zeros(count, dtype=np.bool_)).matrix
     system = heat_system(whole, nodes, stored, state_source(source, n, states))
 
-    def flows(time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def flows(time: float, unknowns: Floats) -> Floats:
         """Q = A (T_c - T_o e)."""
         rows = made.node_temperatures(time, unknowns)[elements.nodes]
         at_contacts = elements.nodes < count - stored.size
@@ -117,7 +117,7 @@ def element_system(
     return made
 
 
-def dipole_amplitudes(system: ParticleSystem, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+def dipole_amplitudes(system: ParticleSystem, unknowns: Floats) -> Floats:
     """Amplitudes D of each particle's linear part, shape (n, d) [K]; zero where there are no such states."""
     states, dimension = system.state_temperatures(unknowns), system.medium.dimension
     if system.states == 1:
@@ -125,7 +125,7 @@ def dipole_amplitudes(system: ParticleSystem, unknowns: NDArray[np.float64]) -> 
     return np.asarray(states @ readings_of_parts(dimension)[1:].T)
 
 
-def contact_temperatures(system: ParticleSystem, time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+def contact_temperatures(system: ParticleSystem, time: float, unknowns: Floats) -> Floats:
     """Node temperature of each particle contact, then of each wall contact that takes part [K]."""
     nodes = system.node_temperatures(time, unknowns)
     return nodes[: nodes.size - system.nodes.states : system.modes]

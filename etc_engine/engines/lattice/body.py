@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags
 from etc_engine.box import Box
 from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.engines.lattice.fitted import fitted_seeds
@@ -24,7 +24,7 @@ ROOM = 1.05
 """Edge of the box that a ball is carved out of, in diameters."""
 
 
-def carve(lattice: Lattice, inside: NDArray[np.bool_]) -> Lattice:
+def carve(lattice: Lattice, inside: Flags) -> Lattice:
     """The part of a lattice that some nodes make up; the links cut become links to a surface, at the cut facets.
 
     Parameters

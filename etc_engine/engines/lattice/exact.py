@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 # Terms exp(-n^2 pi^2 Fo) below this are left out.
 NEGLIGIBLE = 1e-18
 
 
-def _terms(fourier: float) -> NDArray[np.float64]:
+def _terms(fourier: float) -> Floats:
     """Numbers n of the terms of a series in exp(-n^2 pi^2 Fo)."""
     if not fourier > 0.0:
         raise InputError(f"the series need a time after the start, found the Fourier number {fourier:g}")
@@ -20,7 +21,7 @@ def _terms(fourier: float) -> NDArray[np.float64]:
 
 def slab_temperature(
     position: ArrayLike, time: float, *, diffusivity: float, length: float, initial: float, low: float, high: float
-) -> NDArray[np.float64]:
+) -> Floats:
     r"""Temperature in a slab at one temperature whose faces take two others at time 0.
 
     .. math:: T = T_1 + \frac{y}{L} \Delta T + \Delta T \sum_n C_n \sin\frac{n \pi y}{L} e^{-n^2 \pi^2 \alpha t / L^2},
@@ -61,7 +62,7 @@ def slab_temperature(
 
 def ball_temperature(
     distance: ArrayLike, time: float, *, diffusivity: float, radius: float, initial: float, surface: float
-) -> NDArray[np.float64]:
+) -> Floats:
     r"""Temperature in a ball at one temperature whose surface takes another at time 0.
 
     .. math:: T = T_s + \frac{2 R (T_s - T_0)}{\pi r} \sum_n \frac{(-1)^n}{n} \sin\frac{n \pi r}{R}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.errors import GeometryError
@@ -58,17 +58,17 @@ class FittedSeeds:
     """
 
     packing: ParticlePacking
-    owner: NDArray[np.int64]
+    owner: Ints
 
 
 @dataclass(frozen=True, eq=False)
 class _Pairs:
     """Directions and offsets of the seed pairs: inclusion, unit normal, offset, and whether the outer seed stays."""
 
-    sphere: NDArray[np.int64]
-    normal: NDArray[np.float64]
-    offset: NDArray[np.float64]
-    outer: NDArray[np.bool_]
+    sphere: Ints
+    normal: Floats
+    offset: Floats
+    outer: Flags
 
 
 def fitted_seeds(
@@ -166,9 +166,7 @@ def _pairs_on_spheres(inclusions: ParticlePacking, h: float, widest: float, rng:
     return _Pairs(sphere, normal, offset, gap > NARROWEST * h)
 
 
-def _gap_to_others(
-    inclusions: ParticlePacking, sphere: NDArray[np.int64], points: NDArray[np.float64], reach: float
-) -> NDArray[np.float64]:
+def _gap_to_others(inclusions: ParticlePacking, sphere: Ints, points: Floats, reach: float) -> Floats:
     """Distance from points on spheres to the nearest other sphere, at most `reach`; negative inside it."""
     box = inclusions.box
     lengths = np.asarray(box.lengths)
@@ -183,7 +181,7 @@ def _gap_to_others(
     return gap
 
 
-def _spread_directions(number: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def _spread_directions(number: int, rng: np.random.Generator) -> Floats:
     """Unit vectors evenly over the sphere: a Fibonacci spiral, turned at random."""
     k = np.arange(number) + 0.5
     z = 1.0 - 2.0 * k / number
@@ -195,7 +193,7 @@ def _spread_directions(number: int, rng: np.random.Generator) -> NDArray[np.floa
     )
 
 
-def _interface_distance(packing: ParticlePacking, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _interface_distance(packing: ParticlePacking, points: Floats) -> Floats:
     """Distance of points to the nearest surface of a sphere; large for points far from all."""
     box = packing.box
     tree = cKDTree(box.wrap(points), boxsize=np.where(box.periodic, box.lengths, 0.0))
@@ -208,9 +206,7 @@ def _interface_distance(packing: ParticlePacking, points: NDArray[np.float64]) -
     return distance
 
 
-def _assemble(
-    packing: ParticlePacking, pairs: _Pairs, bulk: NDArray[np.float64], h: float, kappa: float, box: Box
-) -> FittedSeeds:
+def _assemble(packing: ParticlePacking, pairs: _Pairs, bulk: Floats, h: float, kappa: float, box: Box) -> FittedSeeds:
     """Seeds for a tuned radius."""
     a = packing.radii[pairs.sphere]
     tuned = a * (1.0 - kappa * (h / a) ** 2)
@@ -223,7 +219,7 @@ def _assemble(
     return FittedSeeds(ParticlePacking(points[kept], np.full(int(kept.sum()), WEIGHT * h), box), owner[kept])
 
 
-def _tuned(packing: ParticlePacking, pairs: _Pairs, bulk: NDArray[np.float64], h: float, box: Box) -> FittedSeeds:
+def _tuned(packing: ParticlePacking, pairs: _Pairs, bulk: Floats, h: float, box: Box) -> FittedSeeds:
     """Secant iteration on kappa until the inclusions' cells have the exact volume."""
     goal = solid_fraction(packing) * packing.box.volume
 

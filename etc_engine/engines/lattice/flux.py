@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from etc_engine.arrays import Flags, Floats
 from etc_engine.engines.lattice.network import Lattice
 from etc_engine.engines.lattice.steady import SteadyField
 from etc_engine.errors import InputError
 from etc_engine.structure.clipping import sort_into_grid
 
 
-def flux_moments(field: SteadyField) -> NDArray[np.float64]:
+def flux_moments(field: SteadyField) -> Floats:
     r"""First moment of the heat flows of every node: volume times heat flux density.
 
     .. math:: M_p = \sum_q W_{p \to q} (c_{pq} - x_p) + \sum_{walls} W_{p \to w} (c_{pw} - x_p)
@@ -64,12 +65,12 @@ def flux_moments(field: SteadyField) -> NDArray[np.float64]:
     return moments
 
 
-def mean_flux(field: SteadyField) -> NDArray[np.float64]:
+def mean_flux(field: SteadyField) -> Floats:
     """Volume average of the heat flux density of the box, shape (3,) [W/m2]."""
     return flux_moments(field).sum(axis=0) / field.lattice.packing.box.volume
 
 
-def halo_flux(field: SteadyField, radius: float, points: ArrayLike | None = None) -> NDArray[np.float64]:
+def halo_flux(field: SteadyField, radius: float, points: ArrayLike | None = None) -> Floats:
     r"""Heat flux density averaged over all nodes within a radius.
 
     .. math:: q_p = \sum_{|x_r - x_p| \le R} M_r \Big/ \sum_{|x_r - x_p| \le R} V_r
@@ -120,7 +121,7 @@ def halo_flux(field: SteadyField, radius: float, points: ArrayLike | None = None
         return np.asarray(sums[:, :3] / sums[:, 3:])
 
 
-def near_wall(lattice: Lattice, radius: float) -> NDArray[np.bool_]:
+def near_wall(lattice: Lattice, radius: float) -> Flags:
     """Whether a halo of a radius about a node reaches over a wall, shape (n,): the wall region, not the core."""
     box, centers = lattice.packing.box, lattice.packing.centers
     over = (centers < radius) | (centers > np.asarray(box.lengths) - radius)
@@ -129,7 +130,7 @@ def near_wall(lattice: Lattice, radius: float) -> NDArray[np.bool_]:
 
 def probe(
     field: SteadyField, points: ArrayLike, conductivity: ArrayLike = 1.0, *, nodes: int = 30
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Temperature and heat flux density at points.
 
     The temperature is that of the nearest node, carried to the point by the node's own gradient -q/k. The heat flux is

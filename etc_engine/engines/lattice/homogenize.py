@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import AXES, Box
 from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.engines.lattice.fitted import fitted_seeds
@@ -155,7 +155,7 @@ class MediumLattice:
     """
 
     lattice: Lattice
-    owner: NDArray[np.int64]
+    owner: Ints
 
     @property
     def volume_fraction(self) -> float:
@@ -210,7 +210,7 @@ def dense_packing(count: int, box: Box, rng: np.random.Generator) -> ParticlePac
         return pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.98 * refusal.reached)
 
 
-def node_conductivities(medium: Medium, owner: NDArray[np.int64]) -> NDArray[np.float64]:
+def node_conductivities(medium: Medium, owner: Ints) -> Floats:
     """Conductivity at each node, a large number where it is infinite, shape (n,) [W/(m K)]."""
     k = of_owners(medium, np.arange(PORE, medium.packing.count))
     finite = np.isfinite(k)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.medium.touching import closest_neighbors
 from etc_engine.packing.particles import ParticlePacking
@@ -55,17 +56,17 @@ class Lattice:
     """
 
     packing: ParticlePacking
-    pairs: NDArray[np.int64]
-    shifts: NDArray[np.int64]
-    sections: NDArray[np.float64]
-    segments: NDArray[np.float64]
-    crossings: NDArray[np.float64]
-    volumes: NDArray[np.float64]
-    wall_particles: NDArray[np.int64]
-    walls: NDArray[np.int64]
-    wall_sections: NDArray[np.float64]
-    wall_segments: NDArray[np.float64]
-    wall_crossings: NDArray[np.float64]
+    pairs: Ints
+    shifts: Ints
+    sections: Floats
+    segments: Floats
+    crossings: Floats
+    volumes: Floats
+    wall_particles: Ints
+    walls: Ints
+    wall_sections: Floats
+    wall_segments: Floats
+    wall_crossings: Floats
 
     @property
     def count(self) -> int:
@@ -78,7 +79,7 @@ class Lattice:
         return 2.0 * self.sections.size / self.count
 
     @cached_property
-    def branches(self) -> NDArray[np.float64]:
+    def branches(self) -> Floats:
         """Branch vectors from node i to the linked image of j, shape (m, 3) [m]."""
         return _branches(self.packing, self.pairs, self.shifts)
 
@@ -93,8 +94,8 @@ class Conductances:
     walls : ndarray, shape (w,) [W/K]
     """
 
-    links: NDArray[np.float64]
-    walls: NDArray[np.float64]
+    links: Floats
+    walls: Floats
 
 
 def laguerre_lattice(packing: ParticlePacking) -> Lattice:
@@ -241,7 +242,7 @@ def link_conductances(
     conductivity: ArrayLike = 1.0,
     *,
     interface_resistance: float = 0.0,
-    phase: NDArray[np.int64] | None = None,
+    phase: Ints | None = None,
 ) -> Conductances:
     """Conductances of the links: both sides of the transmission surface, and the interface, in series.
 
@@ -300,6 +301,6 @@ def link_conductances(
     return Conductances(lattice.sections / resistance, lattice.wall_sections / wall_resistance)
 
 
-def _branches(packing: ParticlePacking, pairs: NDArray[np.int64], shifts: NDArray[np.int64]) -> NDArray[np.float64]:
+def _branches(packing: ParticlePacking, pairs: Ints, shifts: Ints) -> Floats:
     lengths = np.asarray(packing.box.lengths)
     return packing.centers[pairs[:, 1]] - packing.centers[pairs[:, 0]] + shifts * lengths

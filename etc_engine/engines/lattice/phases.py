@@ -7,16 +7,17 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.medium.phases import PORE, find_owners
 from etc_engine.packing.particles import ParticlePacking
 
-Geometry = ParticlePacking | NDArray[np.integer] | Callable[[NDArray[np.float64]], ArrayLike]
+Geometry = ParticlePacking | NDArray[np.integer] | Callable[[Floats], ArrayLike]
 """Spheres in a matrix, an array of voxels that fills the box, or a function of points of shape (m, 3)."""
 
 
-def find_phases(points: ArrayLike, box: Box, geometry: Geometry) -> NDArray[np.int64]:
+def find_phases(points: ArrayLike, box: Box, geometry: Geometry) -> Ints:
     """Phase numbers of points.
 
     Parameters
@@ -64,7 +65,7 @@ def find_phases(points: ArrayLike, box: Box, geometry: Geometry) -> NDArray[np.i
     return voxels[tuple(at.T)].astype(np.int64)
 
 
-def phase_conductivity(phase: NDArray[np.int64], conductivities: ArrayLike) -> NDArray[np.float64]:
+def phase_conductivity(phase: Ints, conductivities: ArrayLike) -> Floats:
     """Conductivity of each node from the phases' conductivities.
 
     Parameters

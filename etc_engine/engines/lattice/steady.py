@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.lattice.network import Conductances, Lattice
 from etc_engine.medium.conductivity import EffectiveConductivity, effective_tensor
 from etc_engine.medium.links import LinkSolution, solve_links
@@ -40,21 +40,21 @@ class SteadyField:
 
     lattice: Lattice
     conductances: Conductances
-    gradient: NDArray[np.float64]
-    temperatures: NDArray[np.float64]
-    wall_temperatures: NDArray[np.float64]
+    gradient: Floats
+    temperatures: Floats
+    wall_temperatures: Floats
     energy: float
     report: SolveReport
 
     @property
-    def link_flows(self) -> NDArray[np.float64]:
+    def link_flows(self) -> Floats:
         """Heat flow from i to j through every link, shape (m,) [W]."""
         i, j = self.lattice.pairs.T
         rise = self.lattice.branches @ self.gradient + self.temperatures[j] - self.temperatures[i]
         return np.where(self.conductances.links > 0.0, -self.conductances.links * np.nan_to_num(rise), 0.0)
 
     @property
-    def wall_flows(self) -> NDArray[np.float64]:
+    def wall_flows(self) -> Floats:
         """Heat flow out of the body through every wall link, shape (w,) [W]; 0 at adiabatic walls."""
         rise = self.wall_temperatures[self.lattice.walls] - self.temperatures[self.lattice.wall_particles]
         return -self.conductances.walls * np.nan_to_num(rise)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.lattice.body import SURFACE
 from etc_engine.engines.lattice.network import Conductances, Lattice
 from etc_engine.errors import InputError
@@ -84,7 +85,7 @@ def heat_system(
         held[rows] = isinstance(condition, FixedTemperature | Convective)
     matrix = laplacian(n, lattice.pairs, conductances.links, lattice.wall_particles[held], tied[held])
 
-    def wall_flow(t: float, wall: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def wall_flow(t: float, wall: int) -> tuple[Floats, Floats]:
         """Heat flow into each linked node: the part that is given, and what a kelvin of the node takes off it."""
         condition, rows = walls[wall], links[wall]
         if isinstance(condition, FixedTemperature | Convective):
@@ -93,13 +94,13 @@ def heat_system(
             return condition.flux(t) * _areas(lattice, wall), np.zeros(rows.size)
         return np.zeros(rows.size), np.zeros(rows.size)
 
-    def load(t: float) -> NDArray[np.float64]:
+    def load(t: float) -> Floats:
         total = heat.copy()
         for wall in walls:
             total += np.bincount(lattice.wall_particles[links[wall]], wall_flow(t, wall)[0], minlength=n)
         return total
 
-    def heat_rates(t: float, temperatures: NDArray[np.float64]) -> NDArray[np.float64]:
+    def heat_rates(t: float, temperatures: Floats) -> Floats:
         flows = []
         for wall in walls:
             given, taken = wall_flow(t, wall)
@@ -136,7 +137,7 @@ def safe_step(lattice: Lattice, system: HeatSystem) -> float:
     return float((system.capacity[linked] / diagonal[linked]).min(initial=np.inf))
 
 
-def _wall_links(lattice: Lattice, wall: int) -> NDArray[np.int64]:
+def _wall_links(lattice: Lattice, wall: int) -> Ints:
     rows = np.flatnonzero(lattice.walls == wall)
     if rows.size == 0:
         raise InputError(
@@ -146,7 +147,7 @@ def _wall_links(lattice: Lattice, wall: int) -> NDArray[np.int64]:
     return rows
 
 
-def _areas(lattice: Lattice, wall: int) -> NDArray[np.float64]:
+def _areas(lattice: Lattice, wall: int) -> Floats:
     """Part of the area of a wall that belongs to each of its links [m2]."""
     sections = lattice.wall_sections[lattice.walls == wall]
     if wall == SURFACE:

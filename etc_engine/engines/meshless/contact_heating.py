@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.discretization import Discretization
 from etc_engine.engines.meshless.domain import Disk
 from etc_engine.engines.meshless.problem import HeatProblem, Neumann
@@ -18,7 +18,6 @@ from etc_engine.errors import GeometryError, InputError
 if TYPE_CHECKING:
     import xarray
 
-Array = NDArray[np.float64]
 #: Heat through one contact per unit thickness [W/m]: a constant or a function of time.
 HeatHistory = float | Callable[[float], float]
 
@@ -51,7 +50,7 @@ class ContactArc:
             )
 
 
-def arc_resistances(arcs: Sequence[ContactArc], conductivity: float) -> Array:
+def arc_resistances(arcs: Sequence[ContactArc], conductivity: float) -> Floats:
     """Resistances h'_ij between contact arcs with uniform flux, shape (n, n) [m K/W].
 
     h'_ij = 1/(pi kappa) sum_{k >= 1} cos(k (theta_i - theta_j)) sinc(k alpha_i) sinc(k alpha_j)/k,
@@ -77,8 +76,8 @@ def arc_resistances(arcs: Sequence[ContactArc], conductivity: float) -> Array:
 
 
 def lumped_arc_temperatures(
-    arcs: Sequence[ContactArc], conductivity: float, heat: Array, mean_temperature: Array
-) -> Array:
+    arcs: Sequence[ContactArc], conductivity: float, heat: Floats, mean_temperature: Floats
+) -> Floats:
     """Arc temperatures of the lumped model, shape (nt, n) [K].
 
     T_i - T_o = sum_j h'_ij Q_j + S/(8 pi kappa), S = sum_j Q_j: the quasi-steady field of constant fluxes, in
@@ -104,13 +103,13 @@ def lumped_arc_temperatures(
 def heat_disk_through_arcs(
     arcs: Sequence[ContactArc],
     heat: Sequence[HeatHistory],
-    times: Sequence[float] | Array,
+    times: Sequence[float] | Floats,
     *,
     radius: float = 1.0,
     conductivity: float = 1.0,
     heat_capacity: float = 1.0,
     initial: float = 0.0,
-    points: Sequence[Sequence[float]] | Array = ((0.0, 0.0),),
+    points: Sequence[Sequence[float]] | Floats = ((0.0, 0.0),),
     scheme: Scheme = "sdirk2",
     steps: int = 200,
     discretization: Discretization | None = None,
@@ -168,7 +167,7 @@ def heat_disk_through_arcs(
     cell = 2.0 * np.pi / chosen.boundary
     density = np.array([1.0 / (2.0 * arc.half_angle * radius) for arc in arcs])
 
-    def flux(x: Array, t: float) -> Array:
+    def flux(x: Floats, t: float) -> Floats:
         covered = np.array([_covered(arc, np.arctan2(x[:, 1], x[:, 0]), cell) for arc in arcs])
         return np.asarray((_heat_at(heat, t) * density) @ covered)
 
@@ -199,8 +198,8 @@ def heat_disk_through_arcs(
 def _with_arcs(
     result: xarray.Dataset,
     arcs: Sequence[ContactArc],
-    temperatures: Array,
-    inputs: Array,
+    temperatures: Floats,
+    inputs: Floats,
     problem: HeatProblem,
 ) -> xarray.Dataset:
     """Add the readings per arc."""
@@ -233,14 +232,14 @@ def _with_arcs(
     )
 
 
-def _heat_at(heat: Sequence[HeatHistory], t: float) -> Array:
+def _heat_at(heat: Sequence[HeatHistory], t: float) -> Floats:
     values = np.array([history(t) if callable(history) else history for history in heat], dtype=float)
     if not np.isfinite(values).all():
         raise InputError(f"the heat through the contact arcs is not finite at t = {t:g}: found {values.tolist()}")
     return values
 
 
-def _covered(arc: ContactArc, angle: Array, cell: float) -> Array:
+def _covered(arc: ContactArc, angle: Floats, cell: float) -> Floats:
     """Part of the cell of width ``cell`` about each angle that the arc covers: heat is kept exactly."""
     distance = np.abs(np.mod(angle - arc.theta + np.pi, 2.0 * np.pi) - np.pi)
     overlap = np.minimum(distance + 0.5 * cell, arc.half_angle) - np.maximum(distance - 0.5 * cell, -arc.half_angle)

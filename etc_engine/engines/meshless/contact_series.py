@@ -7,15 +7,14 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.contact_heating import ContactArc, heat_disk_through_arcs
 from etc_engine.errors import InputError
 
 if TYPE_CHECKING:
     import xarray
-
-Array = NDArray[np.float64]
 
 
 def flow_histories(times: ArrayLike, flows: ArrayLike) -> list[Callable[[float], float]]:
@@ -47,7 +46,7 @@ def flow_histories(times: ArrayLike, flows: ArrayLike) -> list[Callable[[float],
             f"{times.shape} and {flows.shape}"
         )
 
-    def history(column: Array) -> Callable[[float], float]:
+    def history(column: Floats) -> Callable[[float], float]:
         return lambda t: float(np.interp(t, times, column))
 
     return [history(np.ascontiguousarray(column)) for column in flows.T]
@@ -57,7 +56,7 @@ def heat_disk_by_flows(
     arcs: Sequence[ContactArc],
     times: ArrayLike,
     flows: ArrayLike,
-    output_times: Sequence[float] | Array,
+    output_times: Sequence[float] | Floats,
     *,
     steps: int = 200,
     decades: int = 3,

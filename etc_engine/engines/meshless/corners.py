@@ -14,13 +14,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.meshless.domain import Domain, Polygon
 from etc_engine.engines.meshless.nodes import BoundaryNodes
 from etc_engine.engines.meshless.problem import BoundaryCondition, Dirichlet
-
-Array = NDArray[np.float64]
 
 #: d_1 / d_0, which sets s: the field within so short a way carries no heat that matters.
 NEAREST = 1e-5
@@ -32,7 +30,7 @@ NODES_PER_SOURCE = 2
 SMOOTH = 1.0 - 1e-9
 
 
-def singular_corners(domain: Domain, boundary: Sequence[BoundaryCondition]) -> NDArray[np.int64]:
+def singular_corners(domain: Domain, boundary: Sequence[BoundaryCondition]) -> Ints:
     """Vertices of a polygon where nu < 1: re-entrant corners, and changes of the kind of condition.
 
     Examples
@@ -48,9 +46,7 @@ def singular_corners(domain: Domain, boundary: Sequence[BoundaryCondition]) -> N
     return np.flatnonzero(factor * np.pi / _openings(domain) < SMOOTH)
 
 
-def corner_sources(
-    domain: Domain, boundary: Sequence[BoundaryCondition], corners: NDArray[np.int64], count: int
-) -> Array:
+def corner_sources(domain: Domain, boundary: Sequence[BoundaryCondition], corners: Ints, count: int) -> Floats:
     """Sources behind the corners, shape (<= 2 corners x count, 2) [m], except those close to another part of the body.
 
     Between prescribed temperatures the leading mode is even about the bisector, and one ray of sources serves; the
@@ -78,7 +74,7 @@ def corner_sources(
     return np.asarray(sources[~domain.contains(sources) & ~crowded])
 
 
-def corner_nodes(domain: Domain, corners: NDArray[np.int64], count: int) -> BoundaryNodes:
+def corner_nodes(domain: Domain, corners: Ints, count: int) -> BoundaryNodes:
     """Boundary nodes on both edges of each corner, as close to it as its sources."""
     points, normals, edges = [np.empty((0, 2))], [np.empty((0, 2))], [np.empty(0, dtype=np.int64)]
     if isinstance(domain, Polygon):
@@ -95,7 +91,7 @@ def corner_nodes(domain: Domain, corners: NDArray[np.int64], count: int) -> Boun
     return BoundaryNodes(np.concatenate(points), np.concatenate(normals), np.concatenate(edges))
 
 
-def _distances(count: int) -> Array:
+def _distances(count: int) -> Floats:
     """d_j / d_0."""
     if count == 1:
         return np.ones(1)
@@ -103,7 +99,7 @@ def _distances(count: int) -> Array:
     return np.asarray(NEAREST**share)
 
 
-def _openings(domain: Polygon) -> Array:
+def _openings(domain: Polygon) -> Floats:
     """Inner angle at each vertex [rad]."""
     turn = np.sign(domain.signed_area)
     after, before = domain.edges, -np.roll(domain.edges, 1, axis=0)

@@ -6,16 +6,14 @@ import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.discretization import Layout
 from etc_engine.engines.meshless.domain import Polygon
 from etc_engine.engines.meshless.helmholtz import HelmholtzOperator
 from etc_engine.engines.meshless.observation import Observation
 from etc_engine.engines.meshless.problem import Dirichlet, HeatProblem
 from etc_engine.errors import ConvergenceError
-
-Array = NDArray[np.float64]
 
 #: lambda times the node spacing within which time marching was found stable (both methods, splines of
 #: order 1 to 3, square and L): larger values leave the Trefftz part unstable, smaller ones the splines.
@@ -117,7 +115,7 @@ def temperature_span(layout: Layout, readings: list[Observation]) -> float:
     return span if span > 1e-9 * size else max(size, 1e-300)
 
 
-def judge(layout: Layout, readings: list[Observation], residuals: Array, diagnostics: Diagnostics) -> None:
+def judge(layout: Layout, readings: list[Observation], residuals: Floats, diagnostics: Diagnostics) -> None:
     """Refuse fields that are not finite or miss their boundary; warn about figures outside what was tried.
 
     Raises

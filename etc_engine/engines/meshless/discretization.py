@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.meshless import nodes as node_layouts
 from etc_engine.engines.meshless.corners import corner_nodes, corner_sources, singular_corners
 from etc_engine.engines.meshless.domain import circumscribed
@@ -18,7 +18,6 @@ from etc_engine.engines.meshless.radial_basis import PolyharmonicSpline, RadialB
 from etc_engine.engines.meshless.wedges import Wedge, corner_wedges
 from etc_engine.errors import InputError
 
-Array = NDArray[np.float64]
 Method = Literal["trefftz", "mfs"]
 
 #: Collocation points per unknown of the homogeneous part: 2 or more keeps time marching stable.
@@ -67,8 +66,8 @@ class Discretization:
         Go on (with a warning) when the time step operator amplifies; refused otherwise.
     """
 
-    boundary: int | Array = 160
-    interior: int | Array = 480
+    boundary: int | Floats = 160
+    interior: int | Floats = 480
     spacing: Spacing = "chebyshev"
     basis: RadialBasis = PolyharmonicSpline(2)  # noqa: RUF009 - frozen, so one instance may be shared
     functions: int | None = None
@@ -108,17 +107,17 @@ class Layout:
     problem: HeatProblem
     discretization: Discretization
     method: Method
-    center: Array
+    center: Floats
     scale: float
     radius: float
     collocation: BoundaryNodes
     check: BoundaryNodes
-    nodes: Array
+    nodes: Floats
     spacing: float
     functions: int
-    sources: Array
-    clearance: Array
-    nearness: Array
+    sources: Floats
+    clearance: Floats
+    nearness: Floats
     clustered: int = 0
     wedges: tuple[Wedge, ...] = ()
 
@@ -127,16 +126,16 @@ class Layout:
         """Functions of the homogeneous part."""
         return self.functions + len(self.sources)
 
-    def scaled(self, points: Array) -> Array:
+    def scaled(self, points: Floats) -> Floats:
         """Physical positions in scaled coordinates."""
         return (np.asarray(points, dtype=float) - self.center) / self.scale
 
-    def boundary_coefficients(self, edges: NDArray[np.int64]) -> tuple[Array, Array]:
+    def boundary_coefficients(self, edges: Ints) -> tuple[Floats, Floats]:
         """(B1, B2) for boundary nodes of the given edges, B2 with conductivity and scale."""
         pairs = np.array([condition.coefficients() for condition in self.problem.boundary])
         return pairs[edges, 0], pairs[edges, 1] * self.problem.conductivity / self.scale
 
-    def boundary_data(self, where: BoundaryNodes, t: float) -> Array:
+    def boundary_data(self, where: BoundaryNodes, t: float) -> Floats:
         """B3 at boundary nodes and a time."""
         data = np.empty(where.count)
         for edge, condition in enumerate(self.problem.boundary):
@@ -175,7 +174,7 @@ def lay_out(problem: HeatProblem, discretization: Discretization, method: Method
     sources = np.empty((0, 2))
     wedges: tuple[Wedge, ...] = ()
     clustered = 0
-    nearness: Array | None = None
+    nearness: Floats | None = None
     if method == "mfs":
         sources = _place_sources(problem, discretization, functions, radius)
     if isinstance(discretization.boundary, int | np.integer) and discretization.corner_sources:
@@ -240,7 +239,7 @@ def away_from(layout: Layout, vertices: list[int]) -> Layout:
     return replace(layout, check=BoundaryNodes(check.points[kept], check.normals[kept], check.edges[kept]))
 
 
-def _place_sources(problem: HeatProblem, discretization: Discretization, functions: int, radius: float) -> Array:
+def _place_sources(problem: HeatProblem, discretization: Discretization, functions: int, radius: float) -> Floats:
     domain, boundary = problem.domain, discretization.boundary
     if isinstance(boundary, int | np.integer):
         least = 3 * len(problem.boundary)

@@ -7,11 +7,9 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import GeometryError
-
-Array = NDArray[np.float64]
 
 TWO_PI = 2.0 * np.pi
 
@@ -20,23 +18,23 @@ class Domain(Protocol):
     """What the solvers ask of a domain; boundary piece i is walked by a fraction s in [0, 1]."""
 
     @property
-    def edge_lengths(self) -> Array: ...  # noqa: D102
+    def edge_lengths(self) -> Floats: ...  # noqa: D102
     @property
-    def corners(self) -> Array: ...  # noqa: D102
+    def corners(self) -> Floats: ...  # noqa: D102
     @property
     def area(self) -> float: ...  # noqa: D102
     @property
-    def bounds(self) -> tuple[Array, Array]: ...  # noqa: D102
-    def edge_points(self, edge: int, s: Array) -> tuple[Array, Array]: ...  # noqa: D102
-    def nearest_edge(self, points: Array) -> NDArray[np.int64]: ...  # noqa: D102
-    def edge_distances(self, points: Array) -> Array: ...  # noqa: D102
-    def normals_at(self, points: Array, edges: NDArray[np.int64]) -> Array: ...  # noqa: D102
-    def contains(self, points: Array) -> NDArray[np.bool_]: ...  # noqa: D102
-    def star_center(self) -> Array | None: ...  # noqa: D102
-    def quadrature(self, order: int) -> tuple[Array, Array]: ...  # noqa: D102
+    def bounds(self) -> tuple[Floats, Floats]: ...  # noqa: D102
+    def edge_points(self, edge: int, s: Floats) -> tuple[Floats, Floats]: ...  # noqa: D102
+    def nearest_edge(self, points: Floats) -> Ints: ...  # noqa: D102
+    def edge_distances(self, points: Floats) -> Floats: ...  # noqa: D102
+    def normals_at(self, points: Floats, edges: Ints) -> Floats: ...  # noqa: D102
+    def contains(self, points: Floats) -> Flags: ...  # noqa: D102
+    def star_center(self) -> Floats | None: ...  # noqa: D102
+    def quadrature(self, order: int) -> tuple[Floats, Floats]: ...  # noqa: D102
 
 
-def circumscribed(domain: Domain) -> tuple[Array, float]:
+def circumscribed(domain: Domain) -> tuple[Floats, float]:
     """Centre of the bounding box and the largest distance [m] from it to the domain."""
     low, high = domain.bounds
     center = 0.5 * (low + high)
@@ -66,7 +64,7 @@ class Polygon:
     9.0
     """
 
-    vertices: Array
+    vertices: Floats
 
     def __post_init__(self) -> None:
         vertices = np.array(self.vertices, dtype=np.float64)
@@ -81,17 +79,17 @@ class Polygon:
         _refuse_improper(vertices)
 
     @cached_property
-    def edges(self) -> Array:
+    def edges(self) -> Floats:
         """Edge vectors, shape (n, 2) [m]."""
         return np.roll(self.vertices, -1, axis=0) - self.vertices
 
     @cached_property
-    def edge_lengths(self) -> Array:
+    def edge_lengths(self) -> Floats:
         """Edge lengths, shape (n,) [m]."""
         return np.asarray(np.linalg.norm(self.edges, axis=1))
 
     @property
-    def corners(self) -> Array:
+    def corners(self) -> Floats:
         """The vertices: points where the outward normal jumps, shape (n, 2) [m]."""
         return self.vertices
 
@@ -107,38 +105,38 @@ class Polygon:
         return abs(self.signed_area)
 
     @property
-    def bounds(self) -> tuple[Array, Array]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """Lower and upper corner of the bounding box."""
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
     @cached_property
-    def normals(self) -> Array:
+    def normals(self) -> Floats:
         """Outward unit normal of each edge, shape (n, 2)."""
         turn = np.sign(self.signed_area)
         rotated = np.column_stack([self.edges[:, 1], -self.edges[:, 0]])
         return np.asarray(turn * rotated / self.edge_lengths[:, None])
 
-    def edge_points(self, edge: int, s: Array) -> tuple[Array, Array]:
+    def edge_points(self, edge: int, s: Floats) -> tuple[Floats, Floats]:
         """Points at fractions s of an edge, and the outward normals there, each of shape (k, 2)."""
         points = self.vertices[edge] + np.asarray(s)[:, None] * self.edges[edge]
         return points, np.broadcast_to(self.normals[edge], points.shape).copy()
 
-    def edge_distances(self, points: Array) -> Array:
+    def edge_distances(self, points: Floats) -> Floats:
         """Distance [m] of each point to each edge, shape (k, n)."""
         offset = np.asarray(points)[:, None, :] - self.vertices
         s = (offset * self.edges).sum(axis=2) / self.edge_lengths**2
         nearest = np.clip(s, 0.0, 1.0)[:, :, None] * self.edges
         return np.asarray(np.linalg.norm(offset - nearest, axis=2))
 
-    def nearest_edge(self, points: Array) -> NDArray[np.int64]:
+    def nearest_edge(self, points: Floats) -> Ints:
         """The edge closest to each point (the first of equals)."""
         return np.asarray(np.argmin(self.edge_distances(points), axis=1), dtype=np.int64)
 
-    def normals_at(self, points: Array, edges: NDArray[np.int64]) -> Array:  # noqa: ARG002
+    def normals_at(self, points: Floats, edges: Ints) -> Floats:  # noqa: ARG002
         """Outward normal at boundary points that belong to the given edges."""
         return np.asarray(self.normals[edges])
 
-    def contains(self, points: Array) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Flags:
         """True for points strictly inside (even-odd rule; points on the boundary are undecided)."""
         x, y = np.asarray(points).T[:, :, None]
         (x1, y1), (dx, dy) = self.vertices.T, self.edges.T
@@ -147,7 +145,7 @@ class Polygon:
             crossing = x < x1 + dx * (y - y1) / dy
         return np.asarray((straddles & crossing).sum(axis=1) % 2 == 1)
 
-    def star_center(self) -> Array | None:
+    def star_center(self) -> Floats | None:
         """The deepest point of the star kernel (it sees every edge from inside), None if there is none.
 
         The kernel is the intersection of the inner half planes n_i . x <= n_i . v_i; its deepest point
@@ -166,7 +164,7 @@ class Polygon:
             return None
         return np.asarray(program.x[:2])
 
-    def triangles(self) -> NDArray[np.int64]:
+    def triangles(self) -> Ints:
         """Triangulation by ear clipping: vertex numbers, shape (n - 2, 3)."""
         remaining = list(range(len(self.vertices)))
         if self.signed_area < 0.0:
@@ -195,7 +193,7 @@ class Polygon:
             raise GeometryError("the polygon cannot be triangulated: check its vertices for slivers")
         return best
 
-    def quadrature(self, order: int) -> tuple[Array, Array]:
+    def quadrature(self, order: int) -> tuple[Floats, Floats]:
         """Points (k, 2) and weights (k,) [m2]: Gauss of the given order on each triangle (Duffy's map)."""
         nodes, weights = np.polynomial.legendre.leggauss(order)
         s, w = 0.5 * (nodes + 1.0), 0.5 * weights
@@ -250,18 +248,18 @@ class Disk:
         object.__setattr__(self, "breaks", breaks)
 
     @cached_property
-    def spans(self) -> tuple[Array, Array]:
+    def spans(self) -> tuple[Floats, Floats]:
         """First angle and opening angle of each arc [rad]."""
         first = np.array(self.breaks or (0.0,))
         return first, np.diff(np.append(first, first[0] + TWO_PI))
 
     @cached_property
-    def edge_lengths(self) -> Array:
+    def edge_lengths(self) -> Floats:
         """Arc lengths, shape (n,) [m]."""
         return np.asarray(self.radius * self.spans[1])
 
     @property
-    def corners(self) -> Array:
+    def corners(self) -> Floats:
         """No point of a circle is a corner: shape (0, 2)."""
         return np.empty((0, 2))
 
@@ -271,44 +269,44 @@ class Disk:
         return float(np.pi * self.radius**2)
 
     @property
-    def bounds(self) -> tuple[Array, Array]:
+    def bounds(self) -> tuple[Floats, Floats]:
         """Lower and upper corner of the bounding box."""
         center = np.array(self.center)
         return center - self.radius, center + self.radius
 
-    def edge_points(self, edge: int, s: Array) -> tuple[Array, Array]:
+    def edge_points(self, edge: int, s: Floats) -> tuple[Floats, Floats]:
         """Points at fractions s of an arc, and the outward normals there, each of shape (k, 2)."""
         first, opening = self.spans
         angle = first[edge] + np.asarray(s) * opening[edge]
         normals = np.column_stack([np.cos(angle), np.sin(angle)])
         return np.array(self.center) + self.radius * normals, normals
 
-    def edge_distances(self, points: Array) -> Array:
+    def edge_distances(self, points: Floats) -> Floats:
         """Distance [m] of each point to the circle (one column)."""
         r = np.linalg.norm(np.asarray(points) - self.center, axis=1)
         return np.asarray(np.abs(r - self.radius)[:, None])
 
-    def nearest_edge(self, points: Array) -> NDArray[np.int64]:
+    def nearest_edge(self, points: Floats) -> Ints:
         """The arc that a point's angle falls into."""
         x, y = (np.asarray(points) - self.center).T
         first, _ = self.spans
         turn = np.mod(np.arctan2(y, x) - first[0], TWO_PI)
         return np.asarray(np.searchsorted(first - first[0], turn, side="right") - 1, dtype=np.int64)
 
-    def normals_at(self, points: Array, edges: NDArray[np.int64]) -> Array:  # noqa: ARG002
+    def normals_at(self, points: Floats, edges: Ints) -> Floats:  # noqa: ARG002
         """Outward normal at boundary points."""
         offset = np.asarray(points) - self.center
         return np.asarray(offset / np.linalg.norm(offset, axis=1, keepdims=True))
 
-    def contains(self, points: Array) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Flags:
         """True for points strictly inside."""
         return np.asarray(np.linalg.norm(np.asarray(points) - self.center, axis=1) < self.radius)
 
-    def star_center(self) -> Array | None:
+    def star_center(self) -> Floats | None:
         """The centre: it sees the whole circle."""
         return np.array(self.center)
 
-    def quadrature(self, order: int) -> tuple[Array, Array]:
+    def quadrature(self, order: int) -> tuple[Floats, Floats]:
         """Points (k, 2) and weights (k,) [m2]: Gauss in r^2, equal angles."""
         nodes, weights = np.polynomial.legendre.leggauss(order)
         r = self.radius * np.sqrt(0.5 * (nodes + 1.0))
@@ -318,7 +316,7 @@ class Disk:
         return points, np.repeat(0.5 * weights * self.area / len(angle), len(angle))
 
 
-def boundary_quadrature(domain: Domain, order: int, panels: int = 16) -> tuple[Array, Array, Array]:
+def boundary_quadrature(domain: Domain, order: int, panels: int = 16) -> tuple[Floats, Floats, Floats]:
     """Gauss points (k, 2), outward normals (k, 2) and weights (k,) [m] along the boundary.
 
     The boundary is cut into at least ``panels`` pieces of about equal length, shared over the edges.
@@ -336,11 +334,11 @@ def boundary_quadrature(domain: Domain, order: int, panels: int = 16) -> tuple[A
     return np.vstack(points), np.vstack(normals), np.concatenate(measures)
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[0] * b[1] - a[1] * b[0])
 
 
-def _refuse_improper(vertices: Array) -> None:
+def _refuse_improper(vertices: Floats) -> None:
     """Refuse coincident neighbours, edges folded back on themselves, and edges that touch or cross."""
     n = len(vertices)
     edges = np.roll(vertices, -1, axis=0) - vertices
@@ -364,7 +362,7 @@ def _refuse_improper(vertices: Array) -> None:
                 )
 
 
-def _segments_meet(p: Array, d: Array, q: Array, e: Array) -> bool:
+def _segments_meet(p: Floats, d: Floats, q: Floats, e: Floats) -> bool:
     """True if the segments p + s d and q + t e (s, t in [0, 1]) have a common point."""
     margin = 1e-12 * np.linalg.norm(d) * np.linalg.norm(e)
     sides = [float(_cross(d, q - p)), float(_cross(d, q + e - p))]

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import k0e, k1e, kve
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.domain import Domain
 from etc_engine.errors import GeometryError
 
-Array = NDArray[np.float64]
 Field = NDArray
 
 #: A source closer to the body than this part of the wanted offset is left out (re-entrant corners).
@@ -18,7 +18,7 @@ CROWDED = 0.6
 ON_BOUNDARY = 1e-7
 
 
-def fundamental_solutions(points: Array, sources: Array, nearest: Array, lam: complex) -> tuple[Field, Field, Field]:
+def fundamental_solutions(points: Floats, sources: Floats, nearest: Floats, lam: complex) -> tuple[Field, Field, Field]:
     """Scaled fundamental solutions K_0(lambda r)/K_0(lambda d) and their gradients.
 
     Each source's function is one at the distance d of the boundary point nearest to it, so that no
@@ -65,7 +65,7 @@ def _scaled(order: int, z: Field) -> Field:
     return np.asarray(k0e(z) if order == 0 else k1e(z))
 
 
-def offset_sources(domain: Domain, points: Array, normals: Array, offset: float) -> Array:
+def offset_sources(domain: Domain, points: Floats, normals: Floats, offset: float) -> Floats:
     """Sources at a distance along the outward normals, shape (<= k, 2) [m].
 
     Candidates that another edge's body would crowd (behind a re-entrant corner) are left out.
@@ -83,7 +83,7 @@ def offset_sources(domain: Domain, points: Array, normals: Array, offset: float)
     return np.asarray(kept)
 
 
-def factor_sources(domain: Domain, points: Array, factor: float, center: Array | None = None) -> Array:
+def factor_sources(domain: Domain, points: Floats, factor: float, center: Floats | None = None) -> Floats:
     """Sources x + factor (x - center) for boundary points x (Cao et al. 2010, Eq. 39), shape (k, 2) [m].
 
     The centre is the deepest point of the star kernel unless it is given: from any other point some
@@ -104,7 +104,7 @@ def factor_sources(domain: Domain, points: Array, factor: float, center: Array |
     return np.asarray(points + factor * (points - np.asarray(center, dtype=float)))
 
 
-def clearance_of_sources(domain: Domain, sources: Array, radius: float) -> Array:
+def clearance_of_sources(domain: Domain, sources: Floats, radius: float) -> Floats:
     """Distance of each source from the body, shape (m,) [m].
 
     Raises

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import svd
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.discretization import Layout
 from etc_engine.engines.meshless.fundamental_solutions import fundamental_solutions
 from etc_engine.engines.meshless.nodes import BoundaryNodes
@@ -15,7 +16,6 @@ from etc_engine.engines.meshless.particular import SourceInterpolation, particul
 from etc_engine.engines.meshless.trefftz import trefftz_functions
 from etc_engine.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 Field = NDArray
 
 
@@ -29,9 +29,9 @@ class BoundaryFit:
         Number of singular values kept, and largest over smallest singular value of the whole system.
     """
 
-    row_scale: Array
+    row_scale: Floats
     left: Field
-    inverse_values: Array
+    inverse_values: Floats
     right: Field
     rank: int
     condition: float
@@ -64,11 +64,11 @@ class HelmholtzOperator:
         gap = data - self.particular_boundary @ particular
         return np.concatenate([particular, self.fit.solve(gap)])
 
-    def value_rows(self, points: Array) -> Field:
+    def value_rows(self, points: Floats) -> Field:
         """Rows that give u at scaled positions, shape (k, coefficients)."""
         return np.hstack(_values(self.layout, self.lam, points, self.interpolation))
 
-    def gradient_rows(self, points: Array) -> tuple[Field, Field]:
+    def gradient_rows(self, points: Floats) -> tuple[Field, Field]:
         """Rows that give du/dx and du/dy (per metre) at scaled positions."""
         x, y = (np.hstack(parts) for parts in _gradients(self.layout, self.lam, points, self.interpolation))
         return x / self.layout.scale, y / self.layout.scale
@@ -125,20 +125,20 @@ def _reach(layout: Layout) -> float:
     return 2.0 * layout.radius / layout.scale
 
 
-def _values(layout: Layout, lam: complex, points: Array, interpolation: SourceInterpolation) -> tuple[Field, Field]:
+def _values(layout: Layout, lam: complex, points: Floats, interpolation: SourceInterpolation) -> tuple[Field, Field]:
     particular = particular_values(interpolation, points, lam, _reach(layout))
     return particular, _homogeneous(layout, lam, points)[0]
 
 
 def _gradients(
-    layout: Layout, lam: complex, points: Array, interpolation: SourceInterpolation
+    layout: Layout, lam: complex, points: Floats, interpolation: SourceInterpolation
 ) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
     xp, yp = particular_gradients(interpolation, points, lam, _reach(layout))
     _, xh, yh = _homogeneous(layout, lam, points)
     return (xp, xh), (yp, yh)
 
 
-def _homogeneous(layout: Layout, lam: complex, points: Array) -> tuple[Field, Field, Field]:
+def _homogeneous(layout: Layout, lam: complex, points: Floats) -> tuple[Field, Field, Field]:
     """Values and gradients of the Trefftz functions, then of the fundamental solutions."""
     sources = layout.scaled(layout.sources)
     value, x, y = fundamental_solutions(points, sources, layout.clearance / layout.scale, lam)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 TALBOT_NODES = 16
@@ -32,7 +33,7 @@ def talbot_nodes(t: float, count: int = TALBOT_NODES) -> tuple[NDArray[np.comple
     """
     if not (np.isfinite(t) and t > 0.0):
         raise InputError(f"the Laplace transform is inverted at positive times only, found t = {t}")
-    x: NDArray[np.float64] = np.pi * (2.0 * np.arange(count // 2, count) + 1.0) / count - np.pi
+    x: Floats = np.pi * (2.0 * np.arange(count // 2, count) + 1.0) / count - np.pi
     angle = 0.6407 * x
     s = count / t * (-0.6122 + 0.5017 * x / np.tan(angle) + 0.2645j * x)
     slope = count / t * (0.5017 / np.tan(angle) - 0.5017 * angle / np.sin(angle) ** 2 + 0.2645j)

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.meshless.domain import Domain, Polygon
 from etc_engine.errors import GeometryError, InputError
 
-Array = NDArray[np.float64]
 Spacing = Literal["uniform", "chebyshev"]
 
 CANDIDATES_PER_NODE = 24
@@ -34,9 +33,9 @@ class BoundaryNodes:
         Edge numbers.
     """
 
-    points: Array
-    normals: Array
-    edges: NDArray[np.int64]
+    points: Floats
+    normals: Floats
+    edges: Ints
 
     @property
     def count(self) -> int:
@@ -80,7 +79,7 @@ def boundary_nodes(domain: Domain, count: int, spacing: Spacing = "chebyshev") -
     return BoundaryNodes(*(np.concatenate([piece[i] for piece in pieces]) for i in range(3)))
 
 
-def boundary_nodes_at(domain: Domain, points: Array, dirichlet: NDArray[np.bool_]) -> BoundaryNodes:
+def boundary_nodes_at(domain: Domain, points: Floats, dirichlet: Flags) -> BoundaryNodes:
     """Boundary nodes at the user's own points, corners allowed.
 
     A point on a corner belongs to the edge with prescribed temperature if there is one, else to the
@@ -108,7 +107,7 @@ def boundary_nodes_at(domain: Domain, points: Array, dirichlet: NDArray[np.bool_
     return BoundaryNodes(points, domain.normals_at(points, edges), edges.astype(np.int64))
 
 
-def interior_nodes(domain: Domain, count: int, spacing: Spacing = "chebyshev") -> Array:
+def interior_nodes(domain: Domain, count: int, spacing: Spacing = "chebyshev") -> Floats:
     """About (uniform) or exactly (chebyshev) ``count`` nodes strictly inside, shape (k, 2) [m].
 
     ``uniform`` is a square lattice; ``chebyshev`` spreads nodes with a local distance that shrinks towards
@@ -128,7 +127,7 @@ def interior_nodes(domain: Domain, count: int, spacing: Spacing = "chebyshev") -
     return _spread(candidates[inside], local[inside], depth[inside], count)
 
 
-def _lattice(domain: Domain, step: float, margin: float) -> Array:
+def _lattice(domain: Domain, step: float, margin: float) -> Floats:
     low, high = domain.bounds
     axes = []
     for a, b in zip(low, high, strict=True):
@@ -142,7 +141,7 @@ def _lattice(domain: Domain, step: float, margin: float) -> Array:
     return np.asarray(grid)
 
 
-def _spread(candidates: Array, local: Array, depth: Array, count: int) -> Array:
+def _spread(candidates: Floats, local: Floats, depth: Floats, count: int) -> Floats:
     """Farthest-point selection in the metric |x - y| / local(y), started at the deepest candidate."""
     if len(candidates) < count:
         raise GeometryError(f"{count} interior nodes do not fit into the body: ask for fewer")
@@ -159,7 +158,7 @@ def _spread(candidates: Array, local: Array, depth: Array, count: int) -> Array:
     return np.asarray(candidates[chosen])
 
 
-def checked_interior(domain: Domain, points: Array) -> Array:
+def checked_interior(domain: Domain, points: Floats) -> Floats:
     """The user's interior nodes, refused when one lies outside the body."""
     points = _as_points(points, "interior nodes")
     outside = ~domain.contains(points)
@@ -169,7 +168,7 @@ def checked_interior(domain: Domain, points: Array) -> Array:
     return points
 
 
-def refuse_duplicates(points: Array) -> float:
+def refuse_duplicates(points: Floats) -> float:
     """Mean distance [m] from a node to its nearest neighbour.
 
     Raises
@@ -188,7 +187,7 @@ def refuse_duplicates(points: Array) -> float:
     return float(gap.mean())
 
 
-def _as_points(points: Array, what: str) -> Array:
+def _as_points(points: Floats, what: str) -> Floats:
     points = np.asarray(points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or not np.isfinite(points).all():
         raise InputError(f"{what} must be finite positions of shape (k, 2), found shape {points.shape}")

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.discretization import Layout
 from etc_engine.engines.meshless.domain import boundary_quadrature
 from etc_engine.engines.meshless.helmholtz import HelmholtzOperator
 
-Array = NDArray[np.float64]
 Field = NDArray
 
 CHUNK = 2000
@@ -24,12 +24,12 @@ class Probe:
     """Points and quadratures at which solutions of one layout are read (physical coordinates)."""
 
     layout: Layout
-    points: Array
-    area_points: Array
-    area_weights: Array
-    edge_points: Array
-    edge_normals: Array
-    edge_weights: Array
+    points: Floats
+    area_points: Floats
+    area_weights: Floats
+    edge_points: Floats
+    edge_normals: Floats
+    edge_weights: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Observation:
         )
 
 
-def prepare_probe(layout: Layout, points: Array) -> Probe:
+def prepare_probe(layout: Layout, points: Floats) -> Probe:
     """A probe for the given output points of a layout's body."""
     domain = layout.problem.domain
     return Probe(layout, points, *domain.quadrature(AREA_ORDER), *boundary_quadrature(domain, EDGE_ORDER))
@@ -97,7 +97,7 @@ def observe(probe: Probe, operator: HelmholtzOperator, coefficients: Field) -> O
     )
 
 
-def observe_initial(probe: Probe, gradient: tuple[Field, Field], nodal: Array) -> Observation:
+def observe_initial(probe: Probe, gradient: tuple[Field, Field], nodal: Floats) -> Observation:
     """Readings at t = 0: the prescribed state; its flux by the gradient rows of the node interpolation.
 
     What depends on the boundary conditions (inflow, residual) is not defined yet and answered by NaN.

@@ -11,12 +11,12 @@ from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
 from scipy.linalg.lapack import dgecon, zgecon
 from scipy.spatial.distance import cdist
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.polynomials import exponents, monomials, particular_monomials
 from etc_engine.engines.meshless.radial_basis import RadialBasis
 from etc_engine.engines.meshless.wedges import Wedge, wedge_harmonics
 from etc_engine.errors import InputError
 
-Array = NDArray[np.float64]
 Field = NDArray
 
 
@@ -34,7 +34,7 @@ class SourceInterpolation:
     """
 
     basis: RadialBasis
-    nodes: Array
+    nodes: Floats
     lam: complex
     factors: tuple[Field, NDArray[np.int32]]
     condition: float
@@ -57,7 +57,7 @@ class SourceInterpolation:
         transposed = lu_solve(self.factors, rows.T, trans=1, check_finite=False)
         return np.asarray(transposed[: len(self.nodes)].T)
 
-    def gradient_rows(self, points: Array) -> tuple[Field, Field]:
+    def gradient_rows(self, points: Floats) -> tuple[Field, Field]:
         """Rows of the interpolant's derivatives along x and y, each (k, size)."""
         slope = self.basis.slope_over_r(cdist(points, self.nodes), self.lam)
         _, along_x, along_y = _joined(monomials(points, self.basis.polynomial_degree), points, self.wedges, 1.0)
@@ -66,7 +66,7 @@ class SourceInterpolation:
 
 
 def interpolate_source(
-    basis: RadialBasis, nodes: Array, lam: complex = 0.0, wedges: tuple[Wedge, ...] = ()
+    basis: RadialBasis, nodes: Floats, lam: complex = 0.0, wedges: tuple[Wedge, ...] = ()
 ) -> SourceInterpolation:
     """Factorise the interpolation matrix; lambda matters for the reverse basis only.
 
@@ -103,7 +103,7 @@ def interpolate_source(
     return SourceInterpolation(basis, nodes, lam, factors, float(1.0 / reciprocal), wedges)
 
 
-def particular_values(source: SourceInterpolation, points: Array, lam: complex, reach: float) -> Field:
+def particular_values(source: SourceInterpolation, points: Floats, lam: complex, reach: float) -> Field:
     """Values of the particular solutions (psi, polynomials, singular harmonics) at points, shape (k, size)."""
     basis, nodes = source.basis, source.nodes
     psi = basis.particular(cdist(points, nodes), lam, reach)
@@ -111,7 +111,9 @@ def particular_values(source: SourceInterpolation, points: Array, lam: complex, 
     return np.hstack([psi, tail[0]])
 
 
-def particular_gradients(source: SourceInterpolation, points: Array, lam: complex, reach: float) -> tuple[Field, Field]:
+def particular_gradients(
+    source: SourceInterpolation, points: Floats, lam: complex, reach: float
+) -> tuple[Field, Field]:
     """Derivatives of the particular solutions along x and y, each (k, size)."""
     basis, nodes = source.basis, source.nodes
     slope = basis.particular_slope_over_r(cdist(points, nodes), lam, reach)
@@ -123,7 +125,7 @@ def particular_gradients(source: SourceInterpolation, points: Array, lam: comple
 
 
 def _joined(
-    smooth: tuple[Field, Field, Field], points: Array, wedges: tuple[Wedge, ...], factor: complex
+    smooth: tuple[Field, Field, Field], points: Floats, wedges: tuple[Wedge, ...], factor: complex
 ) -> tuple[Field, Field, Field]:
     """Tables of the monomials followed by those of the singular harmonics times a factor."""
     singular = wedge_harmonics(points, wedges)

@@ -7,7 +7,8 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from etc_engine.arrays import Floats
+
 Field = NDArray
 Polynomial = dict[tuple[int, int], complex]
 
@@ -27,12 +28,12 @@ def exponents(degree: int) -> list[tuple[int, int]]:
     return [(total - b, b) for total in range(degree + 1) for b in range(total + 1)]
 
 
-def monomials(points: Array, degree: int) -> tuple[Field, Field, Field]:
+def monomials(points: Floats, degree: int) -> tuple[Field, Field, Field]:
     """Values and both derivatives of the monomials at points, each of shape (k, number of monomials)."""
     return _evaluate([{powers: 1.0} for powers in exponents(degree)], points, complex_valued=False)
 
 
-def particular_monomials(points: Array, lam: complex, degree: int) -> tuple[Field, Field, Field]:
+def particular_monomials(points: Floats, lam: complex, degree: int) -> tuple[Field, Field, Field]:
     """Solutions p of (laplacian - lambda^2) p = x^a y^b: values and derivatives, each (k, monomials).
 
     p = - sum_k lambda^{-2(k+1)} lap^k (x^a y^b), a finite sum; for small lambda, where that sum
@@ -89,7 +90,7 @@ def _rising(polynomial: Polynomial, lam: complex) -> Polynomial:
     return result
 
 
-def _evaluate(polynomials: list[Polynomial], points: Array, complex_valued: bool) -> tuple[Field, Field, Field]:
+def _evaluate(polynomials: list[Polynomial], points: Floats, complex_valued: bool) -> tuple[Field, Field, Field]:
     dtype = complex if complex_valued else float
     highest = max((a + b for polynomial in polynomials for a, b in polynomial), default=0)
     x, y = (np.vander(column, highest + 1, increasing=True) for column in np.asarray(points, dtype=float).T)

@@ -9,16 +9,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.domain import Disk, Domain, Polygon
 from etc_engine.errors import InputError
 
-Array = NDArray[np.float64]
 Field = NDArray
 
 #: A constant, or a function of positions (k, 2) [m] and time [s] that answers (k,) values or one.
-Data = float | Callable[[Array, float], Array | float]
+Data = float | Callable[[Floats, float], Floats | float]
 #: The Laplace transform of such data: a function of positions (k, 2) and complex s [1/s].
-Transform = Callable[[Array, complex], Field | complex]
+Transform = Callable[[Floats, complex], Field | complex]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Dirichlet:
         """B3 is this factor times the data."""
         return 1.0
 
-    def sample(self, points: Array, t: float) -> Array:
+    def sample(self, points: Floats, t: float) -> Floats:
         """B3 at points and a time."""
         return sample(self.data, points, t, "a prescribed temperature")
 
@@ -89,7 +89,7 @@ class Neumann:
         """B3 is this factor times the data."""
         return 1.0
 
-    def sample(self, points: Array, t: float) -> Array:
+    def sample(self, points: Floats, t: float) -> Floats:
         """B3 at points and a time."""
         return sample(self.data, points, t, "a prescribed heat flux")
 
@@ -133,7 +133,7 @@ class Convective:
         """B3 is this factor times the data."""
         return self.coefficient
 
-    def sample(self, points: Array, t: float) -> Array:
+    def sample(self, points: Floats, t: float) -> Floats:
         """B3 at points and a time."""
         return self.coefficient * sample(self.data, points, t, "an ambient temperature")
 
@@ -179,10 +179,10 @@ class HeatProblem:
     9.0
     """
 
-    vertices: Sequence[Sequence[float]] | Array | None = None
+    vertices: Sequence[Sequence[float]] | Floats | None = None
     conductivity: float = field(kw_only=True)
     heat_capacity: float = field(kw_only=True)
-    initial: float | Callable[[Array], Array | float] = field(kw_only=True)
+    initial: float | Callable[[Floats], Floats | float] = field(kw_only=True)
     boundary: Sequence[BoundaryCondition] = field(kw_only=True)
     source: Data | None = field(default=None, kw_only=True)
     source_transform: Transform | None = field(default=None, kw_only=True)
@@ -218,19 +218,19 @@ class HeatProblem:
         """Thermal diffusivity k / (rho c) [m2/s]."""
         return self.conductivity / self.heat_capacity
 
-    def initial_values(self, points: Array) -> Array:
+    def initial_values(self, points: Floats) -> Floats:
         """Initial temperature at points [K]."""
         if callable(self.initial):
             initial = self.initial
             return sample(lambda x, _: initial(x), points, 0.0, "the initial temperature")
         return sample(self.initial, points, 0.0, "the initial temperature")
 
-    def source_values(self, points: Array, t: float) -> Array:
+    def source_values(self, points: Floats, t: float) -> Floats:
         """Heat source at points [W/m3]."""
         return sample(0.0 if self.source is None else self.source, points, t, "the heat source")
 
 
-def sample(data: Data, points: Array, t: float, what: str) -> Array:
+def sample(data: Data, points: Floats, t: float, what: str) -> Floats:
     """Constant or callable data at points and a time, checked for shape and finiteness.
 
     Raises
@@ -253,7 +253,7 @@ def sample(data: Data, points: Array, t: float, what: str) -> Array:
     return np.broadcast_to(values, (len(points),)).copy()
 
 
-def transformed(data: Data, transform: Transform | None, points: Array, s: complex, what: str) -> Field:
+def transformed(data: Data, transform: Transform | None, points: Floats, s: complex, what: str) -> Field:
     """Laplace transform of data at points: c/s for a constant, otherwise the transform that came with it.
 
     Raises

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import digamma, k0, k1, kv
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
-Array = NDArray[np.float64]
 Field = NDArray  # float64 for a real lambda, complex128 on the Laplace contour
 
 #: Below this |lambda| x reach the growing (regular) particular solution is the better-scaled one.
@@ -84,19 +84,19 @@ class PolyharmonicSpline:
         """False: one factorisation of the interpolation matrix serves every time step."""
         return False
 
-    def value(self, r: Array, lam: complex = 0.0) -> Field:  # noqa: ARG002
+    def value(self, r: Floats, lam: complex = 0.0) -> Field:  # noqa: ARG002
         """Values phi = r^{2n} ln r."""
         return _logarithmic(r, self.order, 1.0, 0.0)
 
-    def slope_over_r(self, r: Array, lam: complex = 0.0) -> Field:  # noqa: ARG002
+    def slope_over_r(self, r: Floats, lam: complex = 0.0) -> Field:  # noqa: ARG002
         """phi'(r)/r, so that grad phi = (x - x_i) phi'/r; regular at r = 0 for n >= 2, 0 there for n = 1."""
         return _logarithmic_slope(r, self.order, 1.0, 0.0)
 
-    def particular(self, r: Array, lam: complex, reach: float) -> Field:
+    def particular(self, r: Floats, lam: complex, reach: float) -> Field:
         """Values psi at distances r, for |x - x_i| up to ``reach``."""
         return _combine(self, r, lam, reach, slope=False)
 
-    def particular_slope_over_r(self, r: Array, lam: complex, reach: float) -> Field:
+    def particular_slope_over_r(self, r: Floats, lam: complex, reach: float) -> Field:
         """psi'(r)/r, so that grad psi = (x - x_i) psi'/r."""
         return _combine(self, r, lam, reach, slope=True)
 
@@ -127,20 +127,20 @@ class ReverseBasis:
         """True: phi holds lambda."""
         return True
 
-    def value(self, r: Array, lam: complex = 0.0) -> Field:
+    def value(self, r: Floats, lam: complex = 0.0) -> Field:
         """Values phi = 1 + r - lambda^2 (r^2/4 + r^3/9)."""
         return 1.0 + r - lam**2 * self.particular(r, lam, 0.0)
 
-    def slope_over_r(self, r: Array, lam: complex = 0.0) -> Field:
+    def slope_over_r(self, r: Floats, lam: complex = 0.0) -> Field:
         """phi'(r)/r; the cusp 1/r at r = 0 is answered by 0."""
         cusp = np.divide(1.0, r, out=np.zeros_like(r), where=r > 0.0)
         return cusp - lam**2 * self.particular_slope_over_r(r, lam, 0.0)
 
-    def particular(self, r: Array, lam: complex, reach: float) -> Field:  # noqa: ARG002
+    def particular(self, r: Floats, lam: complex, reach: float) -> Field:  # noqa: ARG002
         """Values psi = r^2/4 + r^3/9."""
         return r * r * (0.25 + r / 9.0)
 
-    def particular_slope_over_r(self, r: Array, lam: complex, reach: float) -> Field:  # noqa: ARG002
+    def particular_slope_over_r(self, r: Floats, lam: complex, reach: float) -> Field:  # noqa: ARG002
         """psi'/r = 1/2 + r/3."""
         return 0.5 + r / 3.0
 
@@ -148,13 +148,13 @@ class ReverseBasis:
 RadialBasis = PolyharmonicSpline | ReverseBasis
 
 
-def _logarithmic(r: Array, power: int, a: float, b: float) -> Array:
+def _logarithmic(r: Floats, power: int, a: float, b: float) -> Floats:
     """r^{2 power} (a ln r + b); at r = 0 its limit, or b where the logarithm diverges."""
     logarithm = np.log(r, out=np.zeros_like(r), where=r > 0.0)
     return np.asarray((r * r) ** power * (a * logarithm + b))
 
 
-def _logarithmic_slope(r: Array, power: int, a: float, b: float) -> Array:
+def _logarithmic_slope(r: Floats, power: int, a: float, b: float) -> Floats:
     """(1/r) d/dr of r^{2 power} (a ln r + b), for r > 0 (0 at r = 0 where it diverges)."""
     logarithm = np.log(r, out=np.zeros_like(r), where=r > 0.0)
     inner = 2.0 * power * (a * logarithm + b) + a
@@ -172,7 +172,7 @@ def _iterated_laplacians(order: int) -> list[tuple[float, float]]:
     return pairs
 
 
-def _combine(spline: PolyharmonicSpline, r: Array, lam: complex, reach: float, slope: bool) -> Field:
+def _combine(spline: PolyharmonicSpline, r: Floats, lam: complex, reach: float, slope: bool) -> Field:
     """Values psi, or psi'/r: the power series where lambda r is small, the closed form elsewhere."""
     series = _series_slope if slope else _series
     n = spline.order
@@ -198,7 +198,7 @@ def _bessel(order: int, z: Field) -> Field:
     return np.asarray(result)
 
 
-def _closed_form(r: Array, lam: complex, n: int) -> Field:
+def _closed_form(r: Floats, lam: complex, n: int) -> Field:
     bessel = _bessel(0, lam * r)
     psi = -(4.0**n) * factorial(n) ** 2 / lam ** (2 * n + 2) * bessel
     log_r, square = np.log(r), r * r
@@ -207,7 +207,7 @@ def _closed_form(r: Array, lam: complex, n: int) -> Field:
     return psi
 
 
-def _closed_form_slope(r: Array, lam: complex, n: int) -> Field:
+def _closed_form_slope(r: Floats, lam: complex, n: int) -> Field:
     bessel = _bessel(1, lam * r)
     psi = 4.0**n * factorial(n) ** 2 / lam ** (2 * n + 1) * bessel / r
     for k, (a, b) in enumerate(_iterated_laplacians(n)):
@@ -227,7 +227,7 @@ def _series_coefficients(lam: complex, n: int, at_zero: complex) -> list[tuple[i
     return terms
 
 
-def _series(r: Array, lam: complex, n: int, at_zero: complex) -> Field:
+def _series(r: Floats, lam: complex, n: int, at_zero: complex) -> Field:
     logarithm = np.log(r, out=np.zeros_like(r), where=r > 0.0)
     square = r * r
     psi = np.zeros(r.shape, dtype=complex if isinstance(lam, complex) else float)
@@ -236,7 +236,7 @@ def _series(r: Array, lam: complex, n: int, at_zero: complex) -> Field:
     return psi
 
 
-def _series_slope(r: Array, lam: complex, n: int, at_zero: complex) -> Field:
+def _series_slope(r: Floats, lam: complex, n: int, at_zero: complex) -> Field:
     logarithm = np.log(r, out=np.zeros_like(r), where=r > 0.0)
     square = r * r
     slope = np.zeros(r.shape, dtype=complex if isinstance(lam, complex) else float)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.meshless.diagnostics import Diagnostics, judge, note_corner_jumps, temperature_span
 from etc_engine.engines.meshless.discretization import Discretization, Layout, Method, away_from, lay_out
 from etc_engine.engines.meshless.helmholtz import prepare_operator
@@ -30,7 +30,6 @@ from etc_engine.errors import InputError
 if TYPE_CHECKING:
     import xarray
 
-Array = NDArray[np.float64]
 Scheme = Literal["sdirk2", "bdf2", "crank-nicolson", "backward-euler", "laplace"]
 
 #: A Laplace transform must agree with its function to this part of the function's size.
@@ -41,8 +40,8 @@ CONTOURS = (16, 32, 64, 96)
 
 def solve_transient(
     problem: HeatProblem,
-    times: Sequence[float] | Array | float,
-    points: Sequence[Sequence[float]] | Array,
+    times: Sequence[float] | Floats | float,
+    points: Sequence[Sequence[float]] | Floats,
     *,
     method: Method = "trefftz",
     scheme: Scheme = "sdirk2",
@@ -148,7 +147,9 @@ def solve_transient(
     )
 
 
-def _solve_marching(probe: Probe, scheme: str, times: Array, steps: int, diagnostics: Diagnostics) -> list[Observation]:
+def _solve_marching(
+    probe: Probe, scheme: str, times: Floats, steps: int, diagnostics: Diagnostics
+) -> list[Observation]:
     """Readings at positive times; each step operator is judged when it is first used."""
     if steps < 1 or int(steps) != steps:
         raise InputError(f"at least one whole time step is needed, found steps = {steps}")
@@ -245,7 +246,7 @@ def _nodes_needed(layout: Layout, t: float) -> int:
     raise InputError(message)
 
 
-def _mismatch(what: str, data: Data, transform: Transform, points: Array, contour: tuple[float, int]) -> str:
+def _mismatch(what: str, data: Data, transform: Transform, points: Floats, contour: tuple[float, int]) -> str:
     """How a transform, inverted at a time with some nodes, differs from its function; empty if it does not."""
     t = contour[0]
     given = np.broadcast_to(np.asarray(data(points, t) if callable(data) else data, dtype=float), len(points))
@@ -268,7 +269,7 @@ def _initial_reading(probe: Probe) -> Observation:
     return observe_initial(probe, interpolation.gradient_rows(layout.scaled(probe.points)), nodal)
 
 
-def _checked_times(times: Sequence[float] | Array | float) -> Array:
+def _checked_times(times: Sequence[float] | Floats | float) -> Floats:
     values = np.atleast_1d(np.asarray(times, dtype=np.float64))
     if values.ndim != 1 or len(values) == 0 or not np.isfinite(values).all():
         raise InputError(f"output times must be a list of finite numbers, found {times!r}")
@@ -277,7 +278,7 @@ def _checked_times(times: Sequence[float] | Array | float) -> Array:
     return values
 
 
-def _checked_points(problem: HeatProblem, points: Sequence[Sequence[float]] | Array) -> Array:
+def _checked_points(problem: HeatProblem, points: Sequence[Sequence[float]] | Floats) -> Floats:
     values = np.asarray(points, dtype=np.float64)
     if values.ndim != 2 or values.shape[1] != 2 or len(values) == 0 or not np.isfinite(values).all():
         raise InputError(f"output points must be positions (x, y), found an array of shape {values.shape}")
@@ -293,10 +294,10 @@ def _checked_points(problem: HeatProblem, points: Sequence[Sequence[float]] | Ar
     return values
 
 
-def _dataset(layout: Layout, scheme: str, times: Array, points: Array, readings: list[Observation]) -> xarray.Dataset:
+def _dataset(layout: Layout, scheme: str, times: Floats, points: Floats, readings: list[Observation]) -> xarray.Dataset:
     import xarray
 
-    def stacked(name: str) -> Array:
+    def stacked(name: str) -> Floats:
         return np.array([getattr(reading, name)[..., 0] for reading in readings])
 
     variables = {

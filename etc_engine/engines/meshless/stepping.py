@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvals
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.meshless.discretization import Layout
 from etc_engine.engines.meshless.helmholtz import HelmholtzOperator, prepare_operator
 from etc_engine.engines.meshless.particular import SourceInterpolation, interpolate_source
 from etc_engine.errors import InputError
 
-Array = NDArray[np.float64]
 MarchingScheme = Literal["sdirk2", "bdf2", "crank-nicolson", "backward-euler"]
 
 #: gamma of the two-stage, stiffly accurate, L-stable SDIRK method of order 2.
@@ -32,15 +32,15 @@ class StepOperator:
     """One lambda's solution at the nodes as two matrices: u = response f + boundary_response g."""
 
     operator: HelmholtzOperator
-    response: Array
-    boundary_response: Array
+    response: Floats
+    boundary_response: Floats
 
     @property
     def lam(self) -> float:
         """The real lambda, in scaled coordinates."""
         return float(np.real(self.operator.lam))
 
-    def nodal(self, source: Array, data: Array) -> Array:
+    def nodal(self, source: Floats, data: Floats) -> Floats:
         """Nodal values of the solution for nodal f and boundary data."""
         return np.asarray(self.response @ source + self.boundary_response @ data)
 
@@ -50,12 +50,12 @@ class Snapshot:
     """The field at one time: nodal values, and the (f, B3) whose Helmholtz solution it is."""
 
     time: float
-    values: Array
+    values: Floats
     step: StepOperator
-    source: Array
-    data: Array
+    source: Floats
+    data: Floats
 
-    def coefficients(self) -> Array:
+    def coefficients(self) -> Floats:
         """Coefficients of the field in the functions of ``step.operator``."""
         return self.step.operator.solve(self.source, self.data)
 
@@ -95,7 +95,7 @@ class StepLibrary:
         return StepOperator(operator, rows[:count] - lift @ rows[count:], lift)
 
 
-def step_counts(times: Array, steps: int) -> NDArray[np.int64]:
+def step_counts(times: Floats, steps: int) -> Ints:
     """Steps for each interval between output times: ``steps`` over the whole, none longer than T/steps.
 
     Examples
@@ -107,7 +107,7 @@ def step_counts(times: Array, steps: int) -> NDArray[np.int64]:
     return np.asarray(np.maximum(1, np.ceil(steps * lengths / times[-1] - 1e-9)), dtype=np.int64)
 
 
-def march(library: StepLibrary, scheme: str, times: Array, steps: int) -> Iterator[Snapshot]:
+def march(library: StepLibrary, scheme: str, times: Floats, steps: int) -> Iterator[Snapshot]:
     """Fields at increasing positive times.
 
     Crank-Nicolson starts (and restarts after a change of the time step) with two backward Euler half
@@ -125,7 +125,7 @@ def march(library: StepLibrary, scheme: str, times: Array, steps: int) -> Iterat
     layout = library.layout
     state: Snapshot | None = None
     values, start = layout.problem.initial_values(layout.nodes), 0.0
-    previous: Array | None = None  # BDF2: the values one step before, if at the same step length
+    previous: Floats | None = None  # BDF2: the values one step before, if at the same step length
     last_tau = 0.0
     for end, count in zip(times, step_counts(times, steps), strict=True):
         tau = (end - start) / count
@@ -148,7 +148,7 @@ def march(library: StepLibrary, scheme: str, times: Array, steps: int) -> Iterat
         yield Snapshot(float(end), state.values, state.step, state.source, state.data)
 
 
-def _implicit(step: StepOperator, layout: Layout, base: Array, t: float, data: Array | None = None) -> Snapshot:
+def _implicit(step: StepOperator, layout: Layout, base: Floats, t: float, data: Floats | None = None) -> Snapshot:
     """Solve (lap - lambda^2) u = -lambda^2 base - Q(t)/k with the boundary data of time t, or those given."""
     heating = layout.problem.source_values(layout.nodes, t) / layout.problem.conductivity
     source = -(step.lam**2) * base - layout.scale**2 * heating
@@ -157,14 +157,14 @@ def _implicit(step: StepOperator, layout: Layout, base: Array, t: float, data: A
     return Snapshot(t, step.nodal(source, data), step, source, data)
 
 
-def _sdirk2(library: StepLibrary, values: Array, t: float, tau: float) -> Snapshot:
+def _sdirk2(library: StepLibrary, values: Floats, t: float, tau: float) -> Snapshot:
     step, layout = library.get(1.0 / GAMMA, tau), library.layout
     stage = _implicit(step, layout, values, t + GAMMA * tau, _stage_data(layout, t, tau)).values
     base = values + (1.0 - GAMMA) / GAMMA * (stage - values)
     return _implicit(step, layout, base, t + tau)
 
 
-def _stage_data(layout: Layout, t: float, tau: float) -> Array:
+def _stage_data(layout: Layout, t: float, tau: float) -> Floats:
     """Boundary data of the first SDIRK stage by the method itself: g(t) + gamma tau g'(t + gamma tau).
 
     The slope is that of the parabola through g at t, t + gamma tau and t + tau. Data of the stage's own
@@ -175,13 +175,13 @@ def _stage_data(layout: Layout, t: float, tau: float) -> Array:
     return np.asarray(start + GAMMA * (slope + GAMMA / (1.0 - GAMMA) * end))
 
 
-def _bdf2(library: StepLibrary, values: Array, previous: Array | None, t: float, tau: float) -> Snapshot:
+def _bdf2(library: StepLibrary, values: Floats, previous: Floats | None, t: float, tau: float) -> Snapshot:
     if previous is None:
         return _sdirk2(library, values, t, tau)
     return _implicit(library.get(1.5, tau), library.layout, (4.0 * values - previous) / 3.0, t + tau)
 
 
-def _crank_nicolson(library: StepLibrary, values: Array, state: Snapshot | None, t: float, tau: float) -> Snapshot:
+def _crank_nicolson(library: StepLibrary, values: Floats, state: Snapshot | None, t: float, tau: float) -> Snapshot:
     """u_new = 2 w - u, where w solves with the mean of old and new boundary data and sources."""
     layout, step = library.layout, library.get(2.0, tau)
     if state is None:
@@ -216,10 +216,10 @@ def spectral_radius(step: StepOperator, scheme: str) -> float:
     return float(np.abs(largest).max()) if len(largest) else float("nan")
 
 
-def _free_step(step: StepOperator, scheme: str, values: Array) -> Array:
+def _free_step(step: StepOperator, scheme: str, values: Floats) -> Floats:
     """One step without sources and boundary data; BDF2 acts on (new, old) pairs."""
 
-    def solve(base: Array) -> Array:
+    def solve(base: Floats) -> Floats:
         return np.asarray(-(step.lam**2) * (step.response @ base))
 
     if scheme == "crank-nicolson":

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ive
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import ConvergenceError
 
-Array = NDArray[np.float64]
 Field = NDArray
 
 #: ln |I_n(lambda)| below which the ratio I_n(lambda r)/I_n(lambda) is taken from its power series.
@@ -18,7 +18,7 @@ SERIES_TERMS = 60
 STEEPEST = 1e6
 
 
-def trefftz_functions(points: Array, lam: complex, count: int) -> tuple[Field, Field, Field]:
+def trefftz_functions(points: Floats, lam: complex, count: int) -> tuple[Field, Field, Field]:
     """Scaled Trefftz functions R_n(r) cos(n phi), R_n(r) sin(n phi) and their gradients.
 
     R_n(r) = I_n(lambda r) / I_n(lambda): each function is at most about one on the unit disk, whatever
@@ -72,7 +72,7 @@ def trefftz_functions(points: Array, lam: complex, count: int) -> tuple[Field, F
     return value, along_x, along_y
 
 
-def scaled_bessel(highest: int, lam: complex, r: Array) -> Field:
+def scaled_bessel(highest: int, lam: complex, r: Floats) -> Field:
     """I_n(lambda r)/I_n(lambda) for n = 0 .. highest, shape (k, highest + 1), free of over- and underflow."""
     n = np.arange(highest + 1)
     direct = n * np.log(abs(lam) / 2.0) - gammaln(n + 1.0) - abs(np.real(lam)) > UNDERFLOW

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.meshless.domain import Domain, Polygon
 from etc_engine.engines.meshless.problem import BoundaryCondition, Dirichlet
-
-Array = NDArray[np.float64]
 
 #: Exponents from here on are smooth enough for the radial functions.
 SMOOTH = 1.0 - 1e-9
@@ -42,20 +40,18 @@ class Wedge:
     exponents : ndarray, shape (m,)
     """
 
-    vertex: Array
+    vertex: Floats
     first: float
     cut: float
     held: bool
-    exponents: Array
+    exponents: Floats
 
-    def scaled(self, center: Array, scale: float) -> Wedge:
+    def scaled(self, center: Floats, scale: float) -> Wedge:
         """The wedge in the coordinates (x - center)/scale."""
         return replace(self, vertex=(self.vertex - center) / scale)
 
 
-def corner_wedges(
-    domain: Domain, boundary: Sequence[BoundaryCondition], corners: NDArray[np.int64]
-) -> tuple[Wedge, ...]:
+def corner_wedges(domain: Domain, boundary: Sequence[BoundaryCondition], corners: Ints) -> tuple[Wedge, ...]:
     """Wedges of the given vertices of a polygon; one without a straight line of sight out of the body is left out."""
     if not isinstance(domain, Polygon):
         return ()
@@ -75,7 +71,7 @@ def corner_wedges(
     return tuple(wedges)
 
 
-def wedge_harmonics(points: Array, wedges: Sequence[Wedge]) -> tuple[Array, Array, Array]:
+def wedge_harmonics(points: Floats, wedges: Sequence[Wedge]) -> tuple[Floats, Floats, Floats]:
     """Values and both derivatives of all singular harmonics at points, each of shape (k, number of them).
 
     Examples

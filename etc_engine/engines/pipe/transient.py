@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.pipe.steady import find_law
 from etc_engine.medium.conductances import contact_conductances
 from etc_engine.medium.links import laplacian
@@ -30,7 +30,7 @@ def pipe_system(
     *,
     method: str = "chord",
     source: Source = 0.0,
-    capacities: NDArray[np.float64] | None = None,
+    capacities: Floats | None = None,
 ) -> ParticleSystem:
     """Pipe network of a packing with storage, and the conditions at the walls of its box.
 
@@ -99,7 +99,7 @@ def pipe_system(
     system = heat_system(whole, nodes, stored, state_source(source, n, 1))
     sides = contact_sides(reduced)
 
-    def flows(time: float, unknowns: NDArray[np.float64]) -> NDArray[np.float64]:
+    def flows(time: float, unknowns: Floats) -> Floats:
         """C (T_j - T_i) into i."""
         temperatures = made.node_temperatures(time, unknowns)
         particles = temperatures[w:]

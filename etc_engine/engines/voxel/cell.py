@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import AXES
 from etc_engine.engines.voxel.conductivity import VoxelConductivity, voxel_conductivity
 from etc_engine.engines.voxel.green import GradientProjection, gradient_projection
@@ -71,10 +72,10 @@ class CellSolution:
         Where asked for: the temperature gradient under a unit mean gradient along each axis wanted.
     """
 
-    tensor: NDArray[np.float64]
+    tensor: Floats
     iterations: int
     solver_error: float
-    gradients: tuple[NDArray[np.float64], ...] = ()
+    gradients: tuple[Floats, ...] = ()
 
 
 def solve_cell(
@@ -151,7 +152,7 @@ def solve_cell(
         known = np.ix_(group, group)
         tensor[known] = part[known]
         loads += found
-    kept: tuple[NDArray[np.float64], ...] = ()
+    kept: tuple[Floats, ...] = ()
     if keep_gradients and not perfect:
         kept = tuple(
             load.fluctuation + np.eye(d)[axis].reshape(d, *(1,) * d) for axis, load in zip(wanted, loads, strict=True)
@@ -208,7 +209,7 @@ def _solve_loads(
     axes: tuple[int, ...],
     scheme: Scheme,
     keep: bool = False,
-) -> tuple[NDArray[np.float64], list[LoadSolution]]:
+) -> tuple[Floats, list[LoadSolution]]:
     """A load along each axis. The energy of two loads is the flux of one and its imbalance in the other's gradient."""
     d = len(conductivity.shape)
     solve = solve_conjugate_gradients if scheme.solver == "cg" else solve_eyre_milton
@@ -233,9 +234,7 @@ def _solve_loads(
     return tensor, loads
 
 
-def _cut_off(
-    tensor: NDArray[np.float64], loads: list[LoadSolution], axes: tuple[int, ...], image: VoxelConductivity
-) -> None:
+def _cut_off(tensor: Floats, loads: list[LoadSolution], axes: tuple[int, ...], image: VoxelConductivity) -> None:
     """Make 0 what insulators leave of the conductivity along an axis that nothing conducts along."""
     least, largest = image.extremes()
     if least > NOTHING * largest:
@@ -251,7 +250,7 @@ def _solve_fluxes(
     projection: GradientProjection | WallProjection,
     axes: tuple[int, ...],
     scheme: Scheme,
-) -> tuple[NDArray[np.float64], list[LoadSolution]]:
+) -> tuple[Floats, list[LoadSolution]]:
     """Mean fluxes along each axis through the resistivities, which vanish in perfect conductors."""
     d = len(image.shape)
     with np.errstate(divide="ignore"):  # scalars of anisotropic voxels are not used and may be 0

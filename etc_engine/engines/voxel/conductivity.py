@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 
 
@@ -29,10 +30,10 @@ class VoxelConductivity:
         Their principal axes, the columns of orthogonal matrices.
     """
 
-    scalars: NDArray[np.float64]
-    rows: NDArray[np.int64]
-    principal: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    scalars: Floats
+    rows: Ints
+    principal: Floats
+    axes: Floats
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -40,11 +41,11 @@ class VoxelConductivity:
         return self.scalars.shape
 
     @cached_property
-    def tensors(self) -> NDArray[np.float64]:
+    def tensors(self) -> Floats:
         """Of the anisotropic voxels, where they are finite, shape (m, d, d)."""
         return np.ascontiguousarray(np.einsum("mai,mi,mbi->mab", self.axes, self.principal, self.axes))
 
-    def of(self, function: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> VoxelConductivity:
+    def of(self, function: Callable[[Floats], Floats]) -> VoxelConductivity:
         """A function of the conductivity, of a tensor through its principal values."""
         return VoxelConductivity(function(self.scalars), self.rows, function(self.principal), self.axes)
 
@@ -55,14 +56,14 @@ class VoxelConductivity:
         parts = [part for part in (self.scalars.ravel()[isotropic], self.principal) if part.size]
         return float(min(part.min() for part in parts)), float(max(part.max() for part in parts))
 
-    def mean(self) -> NDArray[np.float64]:
+    def mean(self) -> Floats:
         """Mean over the voxels, shape (d, d)."""
         isotropic = np.ones(self.scalars.size, dtype=bool)
         isotropic[self.rows] = False
         total = self.scalars.ravel()[isotropic].sum() * np.eye(self.scalars.ndim) + self.tensors.sum(axis=0)
         return total / self.scalars.size
 
-    def apply(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apply(self, field: Floats) -> Floats:
         """Product with a vector field, shape (d, n1, n2[, n3])."""
         product = np.empty_like(field)
         d = field.shape[0]

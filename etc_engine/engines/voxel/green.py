@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.fft import fftfreq, irfftn, rfftfreq, rfftn
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 
 GREEN_OPERATORS = ("rotated", "continuous")
@@ -31,11 +31,11 @@ class GradientProjection:
     """
 
     shape: tuple[int, ...]
-    own: tuple[NDArray[np.float64], ...]
-    cross: tuple[NDArray[np.float64], ...]
+    own: tuple[Floats, ...]
+    cross: tuple[Floats, ...]
     threads: int = 1
 
-    def onto_gradients(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def onto_gradients(self, field: Floats) -> Floats:
         """The gradient part of a vector field, shape (d, *shape), its mean left out."""
         axes = tuple(range(1, field.ndim))
         spectrum = rfftn(field, axes=axes, workers=self.threads)
@@ -43,13 +43,13 @@ class GradientProjection:
         _project(spectrum.reshape(-1, *flat, *spectrum.shape[1:]), *self._padded(self.own), *self._padded(self.cross))
         return irfftn(spectrum, s=self.shape, axes=axes, workers=self.threads, overwrite_x=True)
 
-    def onto_fluxes(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+    def onto_fluxes(self, field: Floats) -> Floats:
         """The divergence-free part of a vector field, shape (d, *shape), its mean left out."""
         rest = field - self.onto_gradients(field)
         rest -= rest.mean(axis=tuple(range(1, field.ndim)), keepdims=True)
         return rest
 
-    def _padded(self, factors: tuple[NDArray[np.float64], ...]) -> tuple[NDArray[np.float64], ...]:
+    def _padded(self, factors: tuple[Floats, ...]) -> tuple[Floats, ...]:
         """Three factors: a plane is one layer of space."""
         return (np.ones(1),) * (3 - len(factors)) + factors
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.voxel.cell import CellSolution, Scheme, solve_cell
 from etc_engine.errors import ConvergenceError, InputError
 
@@ -17,7 +17,7 @@ RINGING_LIMIT = 300
 """Iterations after which the continuous Green operator is given up."""
 
 
-def image_conductivity(labels: NDArray[np.int64], phases: Mapping[int, float]) -> NDArray[np.float64]:
+def image_conductivity(labels: Ints, phases: Mapping[int, float]) -> Floats:
     """Conductivity of each voxel.
 
     Parameters
@@ -55,7 +55,7 @@ def image_conductivity(labels: NDArray[np.int64], phases: Mapping[int, float]) -
 
 
 def homogenize_image(
-    labels: NDArray[np.int64],
+    labels: Ints,
     phases: Mapping[int, float],
     lengths: tuple[float, ...],
     *,
@@ -101,7 +101,7 @@ def homogenize_image(
     """
     conductivity = image_conductivity(labels, phases)
 
-    def solve(values: NDArray[np.float64], green: str, limit: int = 5000) -> CellSolution:
+    def solve(values: Floats, green: str, limit: int = 5000) -> CellSolution:
         scheme = Scheme(solver, green, tolerance, threads, limit)
         return solve_cell(values, lengths, boundary=boundary, scheme=scheme)
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.voxel.conductivity import VoxelConductivity
 from etc_engine.errors import ConvergenceError
 
-Field = NDArray[np.float64]
+Field = Floats
 Projection = Callable[[Field], Field]
 
 DELAY = 4
@@ -45,7 +45,7 @@ class LoadSolution:
         Estimated relative error of the conductivity left by the solver.
     """
 
-    flux: NDArray[np.float64]
+    flux: Floats
     fluctuation: Field
     imbalance: Field | None
     iterations: int
@@ -53,7 +53,7 @@ class LoadSolution:
 
 
 def solve_eyre_milton(
-    conductivity: VoxelConductivity, project: Projection, load: NDArray[np.float64], tolerance: float, limit: int
+    conductivity: VoxelConductivity, project: Projection, load: Floats, tolerance: float, limit: int
 ) -> LoadSolution:
     r"""Eyre and Milton's fixed point for the polarization :math:`\tau = (k + k_0) \nabla T`.
 
@@ -116,7 +116,7 @@ def solve_eyre_milton(
 
 
 def solve_conjugate_gradients(
-    conductivity: VoxelConductivity, project: Projection, load: NDArray[np.float64], tolerance: float, limit: int
+    conductivity: VoxelConductivity, project: Projection, load: Floats, tolerance: float, limit: int
 ) -> LoadSolution:
     r"""Conjugate gradients on :math:`\Gamma k (E + e) = 0` in the space of gradients e.
 

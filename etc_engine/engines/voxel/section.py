@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import map_coordinates
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.voxel.cell import DEFAULT_SCHEME, Scheme, solve_cell
 from etc_engine.engines.voxel.voxelization import check_resolution, voxelize
 from etc_engine.errors import InputError
@@ -33,8 +34,8 @@ class Section:
     """
 
     extent: tuple[float, float]
-    fractions: NDArray[np.float64]
-    flux: NDArray[np.float64]
+    fractions: Floats
+    flux: Floats
     height: float | None = None
 
 
@@ -93,7 +94,7 @@ def section_of(medium: Medium, method: str, options: Mapping[str, Any]) -> Secti
     return solve_section(medium, boundary=boundary, voxels=method, scheme=scheme, **given)
 
 
-def temperature_between_walls(gradients: NDArray[np.float64], axis: int, length: float) -> NDArray[np.float64]:
+def temperature_between_walls(gradients: Floats, axis: int, length: float) -> Floats:
     """Temperature in the voxels of a cell between walls, 0 at the low one, for a unit mean gradient.
 
     Parameters
@@ -119,7 +120,7 @@ def temperature_between_walls(gradients: NDArray[np.float64], axis: int, length:
     return np.asarray(np.cumsum(along, axis=axis) - 0.5 * along)
 
 
-def sample(field: NDArray[np.float64], points: ArrayLike, lengths: tuple[float, ...]) -> NDArray[np.float64]:
+def sample(field: Floats, points: ArrayLike, lengths: tuple[float, ...]) -> Floats:
     """Values at points, linear between the centres of the voxels.
 
     Parameters

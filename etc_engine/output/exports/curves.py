@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.comparison.simulation import simulated, study_of
 from etc_engine.errors import InputError
 
@@ -37,10 +37,10 @@ class Curve:
         The other coordinates of the sweep: density, pressure, ...
     """
 
-    temperature: NDArray[np.float64]
-    conductivity: NDArray[np.float64]
-    half_width: NDArray[np.float64]
-    count: NDArray[np.int64]
+    temperature: Floats
+    conductivity: Floats
+    half_width: Floats
+    count: Ints
     at: Mapping[str, Any]
 
     @property

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.errors import InputError
 from etc_engine.output.exports.curves import Curve
 
@@ -32,7 +32,7 @@ class Fit:
         Temperatures of the first and the last point.
     """
 
-    coefficients: NDArray[np.float64]
+    coefficients: Floats
     residual: float
     relative: float
     low: float
@@ -48,7 +48,7 @@ class Fit:
         """True if the polynomial passes through every interval."""
         return self.relative <= 1.0
 
-    def at(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, temperature: Floats) -> Floats:
         """Value of the polynomial [W/(m K)]."""
         return np.asarray(np.polynomial.polynomial.polyval(temperature, self.coefficients), dtype=np.float64)
 
@@ -104,7 +104,7 @@ def fit_curve(curve: Curve) -> Fit:
     return best
 
 
-def _of_order(curve: Curve, order: int, allowed: NDArray[np.float64]) -> Fit:
+def _of_order(curve: Curve, order: int, allowed: Floats) -> Fit:
     t = curve.temperature
     series = np.polynomial.Polynomial.fit(t, curve.conductivity, order, w=1.0 / allowed)
     coefficients = np.zeros(order + 1)

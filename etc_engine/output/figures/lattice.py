@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, style
 
-Series = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+Series = Mapping[str, tuple[Floats, Floats]]
 """Label -> (abscissae, ordinates)."""
 
 
@@ -32,7 +32,7 @@ def _finish(axes: Axes, across: str, up: str, legend: bool = True) -> None:
         axes.legend(fontsize=8, frameon=False)
 
 
-def draw_calibration(points: Mapping[str, NDArray[np.float64]], mean_field: NDArray[np.float64]) -> Figure:
+def draw_calibration(points: Mapping[str, Floats], mean_field: Floats) -> Figure:
     """Transmission coefficient over the number of particles, one series for each way of tying the faces.
 
     Parameters
@@ -57,9 +57,7 @@ def draw_calibration(points: Mapping[str, NDArray[np.float64]], mean_field: NDAr
     return figure
 
 
-def draw_slab(
-    profiles: Mapping[float, tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]], errors: Series
-) -> Figure:
+def draw_slab(profiles: Mapping[float, tuple[Floats, Floats, Floats]], errors: Series) -> Figure:
     """Temperature in a slab at a few times with the exact profiles, and the largest error over time.
 
     Parameters
@@ -85,7 +83,7 @@ def draw_slab(
     return figure
 
 
-def draw_ball(time: NDArray[np.float64], exact: NDArray[np.float64], centre: Series, errors: Series) -> Figure:
+def draw_ball(time: Floats, exact: Floats, centre: Series, errors: Series) -> Figure:
     """Temperature at the centre of a ball over time, and its error over the number of nodes.
 
     Parameters
@@ -109,7 +107,7 @@ def draw_ball(time: NDArray[np.float64], exact: NDArray[np.float64], centre: Ser
     return figure
 
 
-def draw_halo(spread: Series, fluxes: Mapping[str, NDArray[np.float64]]) -> Figure:
+def draw_halo(spread: Series, fluxes: Mapping[str, Floats]) -> Figure:
     """Coefficient of variation of the heat flux over the halo's radius, and the distribution of the flux.
 
     Parameters
@@ -133,7 +131,7 @@ def draw_halo(spread: Series, fluxes: Mapping[str, NDArray[np.float64]]) -> Figu
     return figure
 
 
-def draw_inclusion(contrasts: NDArray[np.float64], exact: NDArray[np.float64], found: Series, errors: Series) -> Figure:
+def draw_inclusion(contrasts: Floats, exact: Floats, found: Series, errors: Series) -> Figure:
     """Conductivity of a single inclusion over the contrast, and the errors.
 
     Parameters
@@ -158,7 +156,7 @@ def draw_inclusion(contrasts: NDArray[np.float64], exact: NDArray[np.float64], f
     return figure
 
 
-def draw_fractions(lines: Series, points: Sequence[tuple[str, NDArray[np.float64]]]) -> Figure:
+def draw_fractions(lines: Series, points: Sequence[tuple[str, Floats]]) -> Figure:
     """Conductivity over volume fraction: models as lines, simulations as points with error bars.
 
     Parameters

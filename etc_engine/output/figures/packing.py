@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.output.figures.canvas import INK, new_figure, save
 from etc_engine.packing.particles import ParticlePacking
 
@@ -77,7 +77,7 @@ def draw_particles(axes: Axes, packing: ParticlePacking) -> None:
     axes.spines[:].set_visible(False)
 
 
-def _seen(packing: ParticlePacking) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _seen(packing: ParticlePacking) -> tuple[Floats, Floats, Floats]:
     """Centres in the plane, radii and heights of what is drawn, with the images across periodic sides."""
     centers, radii = packing.centers, packing.radii
     for axis in range(2):

@@ -9,8 +9,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.box import AXES
 from etc_engine.medium.field import ParticleField
 from etc_engine.packing.particles import ParticlePacking
@@ -46,6 +46,7 @@ def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
     image = slice_temperatures(field, PIXELS)
     shown = left.imshow(image, extent=(0, width, 0, height), origin="lower", cmap=COLOURS, norm=scale)
     left.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", aspect="equal", facecolor="0.9")
+    left.locator_params(nbins=6)
     left.set_title(f"slice at {AXES[normal]} = {0.5 * packing.box.lengths[normal]:.3g} m", fontsize=9)
     view, frame = draw_view(packing, COLOURS(scale(np.ma.masked_invalid(field.particle_temperatures))), PIXELS)
     right.imshow(view, extent=frame, interpolation="bilinear", zorder=2)
@@ -73,7 +74,7 @@ def slice_axes(load: int) -> tuple[int, int, int]:
     return across, up, normal
 
 
-def slice_temperatures(field: ParticleField, pixels: int) -> NDArray[np.float64]:
+def slice_temperatures(field: ParticleField, pixels: int) -> Floats:
     """Temperatures in the middle plane of the box that contains the load axis, NaN between the spheres.
 
     Parameters
@@ -124,13 +125,13 @@ def slice_temperatures(field: ParticleField, pixels: int) -> NDArray[np.float64]
     return values
 
 
-def _images(packing: ParticlePacking) -> NDArray[np.float64]:
+def _images(packing: ParticlePacking) -> Floats:
     """Shifts of the box, in its lengths, by which spheres reach into it."""
     steps = [(-1.0, 0.0, 1.0) if flag else (0.0,) for flag in packing.box.periodic]
     return np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _screen() -> NDArray[np.float64]:
+def _screen() -> Floats:
     """Unit vectors to the right and up the picture, shape (2, 3), z upright."""
     right = np.cross([0.0, 0.0, 1.0], TOWARDS)
     right /= np.linalg.norm(right)
@@ -138,8 +139,8 @@ def _screen() -> NDArray[np.float64]:
 
 
 def draw_view(
-    packing: ParticlePacking, colours: NDArray[np.float64], pixels: int
-) -> tuple[NDArray[np.float64], tuple[float, float, float, float]]:
+    packing: ParticlePacking, colours: Floats, pixels: int
+) -> tuple[Floats, tuple[float, float, float, float]]:
     """Parallel projection of spheres, hidden parts removed, lit from the front; edges darkened where the depth jumps.
 
     Parameters
@@ -191,12 +192,12 @@ def draw_view(
     return image[::-1], (left, left + columns * step, bottom, bottom + rows * step)
 
 
-def _half_way(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+def _half_way(first: Floats, second: Floats) -> Floats:
     middle = first + second
     return np.asarray(middle / np.linalg.norm(middle))
 
 
-def box_corners(packing: ParticlePacking) -> NDArray[np.float64]:
+def box_corners(packing: ParticlePacking) -> Floats:
     """Corners of the box, shape (8, 3)."""
     return np.stack(np.meshgrid(*([0.0, length] for length in packing.box.lengths), indexing="ij"), -1).reshape(-1, 3)
 

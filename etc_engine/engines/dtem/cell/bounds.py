@@ -10,17 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import splu
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.cell.conductivity import dual_tensor
 from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution, divide
 from etc_engine.engines.dtem.cell.polar_mesh import PolarMesh, polar_mesh, unit_energies
 from etc_engine.engines.dtem.cell.rim_grid import BONDED
 from etc_engine.errors import InputError
-
-Floats = NDArray[np.float64]
 
 MOST_DISKS = 400
 """The mesh has about a thousand nodes a disk and is solved directly."""
@@ -134,7 +132,7 @@ def _energy_tensor(geometry: CellGeometry, mesh: PolarMesh, solid: Floats, fluid
     return tensor
 
 
-def _solve(matrix: csr_matrix, rhs: Floats, held: NDArray[np.int64]) -> Floats:
+def _solve(matrix: csr_matrix, rhs: Floats, held: Ints) -> Floats:
     """Unknowns of a symmetric system, those held at zero."""
     free = np.setdiff1d(np.flatnonzero(matrix.diagonal() > 0.0), held)
     inner = csc_matrix(matrix[free][:, free])

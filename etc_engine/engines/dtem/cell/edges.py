@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.cell.rim_grid import (
     BONDED,
     CORNER,
@@ -22,9 +22,6 @@ from etc_engine.engines.dtem.cell.rim_grid import (
 )
 from etc_engine.errors import GeometryError
 from etc_engine.structure.laguerre_2d import LaguerreCells
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ROUND_OFF_GAP = 1e-8
 """Disks closer than this, or overlapping less, in units of the smaller radius, touch in a point."""
@@ -98,7 +95,7 @@ class CellEdges(NamedTuple):
     resistances: Floats
     angles: Floats
     widths: Floats
-    at_wall: NDArray[np.bool_]
+    at_wall: Flags
     smaller: Floats
     uniform_jump: bool
 
@@ -149,7 +146,7 @@ def cell_edges(cells: LaguerreCells, radii: Floats, contacts: EdgeContacts | Non
     )
 
 
-def release_contacts(edges: CellEdges, rows: NDArray[np.bool_]) -> CellEdges:
+def release_contacts(edges: CellEdges, rows: Flags) -> CellEdges:
     """The same edges with the marked prescribed contacts taken away; overlaps stay.
 
     Parameters

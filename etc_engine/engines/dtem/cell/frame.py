@@ -12,12 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.structure.laguerre_2d import LaguerreCells
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_DEGREES = 5
 """Highest degree that can be asked for."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.cell.bounds import conductivity_bounds
 from etc_engine.engines.dtem.cell.conductivity import CALIBRATED_ERROR, cell_conductivity
 from etc_engine.engines.dtem.cell.conductivity import error_estimate as estimate_error
@@ -24,9 +24,6 @@ from etc_engine.medium.medium import Medium, check_conductors
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.sides import contact_sides
 from etc_engine.structure.laguerre_2d import LaguerreCells, laguerre_cells
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def disk_conductivity(

@@ -11,14 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.cell.frame import lobatto_points
 from etc_engine.engines.dtem.cell.geometry import CellGeometry
 from etc_engine.engines.dtem.cell.rim_grid import CUT, NECK, TOUCHING, EdgeGrid
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 GROWTH = 0.35
 """Each ring towards the rim is thinner by this factor."""
@@ -54,7 +51,7 @@ class PolarMesh:
     places: Floats
     shape: Floats
     cells: Ints
-    solid: NDArray[np.bool_]
+    solid: Flags
     on_wall: tuple[Ints, ...]
 
 
@@ -67,10 +64,10 @@ class _Columns:
     clearance: Floats
     direction: Floats
     edge_nodes: Ints
-    meets: NDArray[np.bool_]
-    chord: NDArray[np.bool_]
-    neck: NDArray[np.bool_]
-    ends: NDArray[np.int64]
+    meets: Flags
+    chord: Flags
+    neck: Flags
+    ends: Ints
 
 
 def polar_mesh(geometry: CellGeometry, grid: EdgeGrid, degree: int) -> PolarMesh:
@@ -80,7 +77,7 @@ def polar_mesh(geometry: CellGeometry, grid: EdgeGrid, degree: int) -> PolarMesh
     intervals = np.diff(grid.starts) - 1
     first_inner = cells.vertex_count + np.concatenate(([0], np.cumsum(intervals * degree - 1)))
     count = int(first_inner[-1])
-    blocks: list[tuple[Ints, Floats, Floats, NDArray[np.bool_]]] = []
+    blocks: list[tuple[Ints, Floats, Floats, Flags]] = []
     owners: list[Ints] = []
     smallest = np.array(
         [np.diff(grid.points[a:b]).min() for a, b in zip(grid.starts[:-1], grid.starts[1:], strict=True)]
@@ -150,7 +147,7 @@ def _columns(geometry: CellGeometry, grid: EdgeGrid, row: int, share: Floats, fi
 
 def _cell_elements(
     sides: list[_Columns], radius: float, rings: Floats, degree: int, count: int
-) -> tuple[Ints, Floats, Floats, NDArray[np.bool_], int]:
+) -> tuple[Ints, Floats, Floats, Flags, int]:
     """Elements of one cell, with new nodes numbered from ``count``."""
     layers, share = rings.size - 1, 0.5 * (lobatto_points(degree) + 1.0)
     lengths = np.array([side.s.size - 1 for side in sides])

@@ -10,16 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.cell.assembly import rim_nodes
 from etc_engine.engines.dtem.cell.element import reduce_cell, strip_of, workspace
 from etc_engine.engines.dtem.cell.elimination import substitute_back
 from etc_engine.engines.dtem.cell.steady import CellModel, CellSolution
 from etc_engine.engines.dtem.cell.strip import FIELDS
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 HARMONICS = 48
 """Fourier modes of the temperature inside a disk."""

@@ -17,10 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from etc_engine.arrays import Floats, Ints
 
 LONGEST = 0.2
 """Longest interval in radii of the smaller disk."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.cell.conductivity import ALIKE
 from etc_engine.engines.dtem.cell.geometry import DEGREE, CellGeometry, Resolution
 from etc_engine.engines.dtem.cell.medium import edge_network, medium_geometry
@@ -24,8 +24,6 @@ from etc_engine.medium.transient import ParticleSystem, Source, joined_walls, pa
 from etc_engine.medium.wall_nodes import heat_system, number_nodes
 from etc_engine.medium.walls import Insulated, WallCondition, wall_conditions
 
-Floats = NDArray[np.float64]
-
 
 def cell_system(
     medium: Medium,
@@ -34,7 +32,7 @@ def cell_system(
     method: str = "cell",
     degree: int = DEGREE,
     source: Source = 0.0,
-    capacities: NDArray[np.float64] | None = None,
+    capacities: Floats | None = None,
     **_: object,
 ) -> ParticleSystem:
     """Cells that store heat, assembled, with the conditions at the walls of the box.
@@ -106,7 +104,7 @@ def cell_system(
     return made
 
 
-def _fold(model: CellModel, joined: NDArray[np.int64]) -> tuple[csr_matrix, NDArray[np.int64]]:
+def _fold(model: CellModel, joined: Ints) -> tuple[csr_matrix, Ints]:
     """Frame unknowns from nodes: free unknowns, one node per joined wall, disks. Returns it and the walls.
 
     Where two such walls meet, the first one has the corner.

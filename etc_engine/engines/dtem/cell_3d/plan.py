@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box
 from etc_engine.engines.dtem.cell_3d.topology import CellTopology
 from etc_engine.errors import GeometryError
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+Integers = Ints
 
 WITHIN = 0.12
 """The centre of a fan keeps this part of the centroid's distance from every edge."""
@@ -82,7 +81,7 @@ class CellPlan:
     heights: Floats
     disks: Floats
     circles: Floats
-    contacts: NDArray[np.bool_]
+    contacts: Flags
     pieces: Integers
     centers: Floats
     level_starts: Integers

@@ -21,11 +21,12 @@ import functools
 import numpy as np
 from numba import njit
 from numpy.polynomial import Legendre
-from numpy.typing import NDArray
+
+from etc_engine.arrays import Floats
 
 
 @functools.cache
-def radial_moments(degree: int) -> NDArray[np.float64]:
+def radial_moments(degree: int) -> Floats:
     r"""Integrals over t of the radial functions t, 1 - t, b_2 .. b_degree; shape (6, degree + 1, degree + 1).
 
     In turn b_p b_q, b_p t b_q', t^2 b_p' b_q', and (1 - t)^n b_p' b_q' for n = 0, 1, 2.

@@ -16,14 +16,15 @@ import functools
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+
+from etc_engine.arrays import Floats
 
 KNOTS = 2000
 """Knots of the table, uniform in sqrt(s)."""
 
 
-def green_function(s: NDArray[np.float64]) -> NDArray[np.float64]:
+def green_function(s: Floats) -> Floats:
     """G at s = sin(gamma/2), by quadrature.
 
     Examples
@@ -40,12 +41,12 @@ def green_function(s: NDArray[np.float64]) -> NDArray[np.float64]:
     e = np.exp(-u)
     density, beyond = u * e * half[:, None] * weights, np.expm1(-u) ** 2
     integral = [float(np.sum(density / np.sqrt(beyond + 4.0 * x * x * e))) for x in s]
-    green: NDArray[np.float64] = (1.0 - 2.0 * np.log1p(s) + np.array(integral) - 1.0) / (4.0 * np.pi)
+    green: Floats = (1.0 - 2.0 * np.log1p(s) + np.array(integral) - 1.0) / (4.0 * np.pi)
     return green
 
 
 @functools.cache
-def green_table() -> NDArray[np.float64]:
+def green_table() -> Floats:
     """Cubic pieces of G over sqrt(s), shape (knots, 4), highest power first; off by less than 1e-11."""
     root = np.linspace(0.0, 1.0, KNOTS + 1)
     spline = CubicSpline(root, green_function(root**2), bc_type=((1, 0.0), "not-a-knot"))

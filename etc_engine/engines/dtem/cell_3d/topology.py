@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Ints
 from etc_engine.errors import GeometryError
 from etc_engine.structure.laguerre_polygons import LaguerrePolygons
 
-Integers = NDArray[np.int64]
+Integers = Ints
 
 IMAGES = 16
 """Images of a vertex beside one cell, per axis, that a key has room for."""
@@ -55,7 +55,7 @@ class CellTopology:
     corner_vertices: Integers
     corner_edges: Integers
     edge_of_corner: Integers
-    forward: NDArray[np.bool_]
+    forward: Flags
     edge_count: int
 
 
@@ -116,7 +116,7 @@ def cell_topology(polygons: LaguerrePolygons, cells: int) -> CellTopology:
     )
 
 
-def _edges(p: LaguerrePolygons, following: Integers) -> tuple[NDArray[np.bool_], Integers, int]:
+def _edges(p: LaguerrePolygons, following: Integers) -> tuple[Flags, Integers, int]:
     """Orientation common to all facets, global edge of each corner, number of edges."""
     start, end = p.corners, p.corners[following]
     step = p.images[following] - p.images
@@ -141,7 +141,7 @@ def _packed(images: Integers) -> Integers:
 
 
 def _number(
-    owner: Integers, number: Integers, images: Integers, inner: NDArray[np.bool_], cells: int
+    owner: Integers, number: Integers, images: Integers, inner: Flags, cells: int
 ) -> tuple[Integers, Integers, Integers, Integers]:
     """Where each cell starts, numbers and images of its members, and the place of each corner inside its cell."""
     most = int(number.max()) + 1

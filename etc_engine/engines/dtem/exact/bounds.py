@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.exact.jumps import jump_energies
 from etc_engine.engines.dtem.steady import SteadySolution
 from etc_engine.errors import InputError
@@ -19,7 +19,7 @@ def element_error(modes: int) -> float:
     return 1e-7 if modes <= 4 else 2e-8
 
 
-def energy_bounds(solution: SteadySolution) -> NDArray[np.float64]:
+def energy_bounds(solution: SteadySolution) -> Floats:
     r"""Bounds of the energy of every load, shape (k, 2): lower, upper.
 
     Thomson's principle: the fluxes of the method are equilibrated in every disk and equal and opposite across every

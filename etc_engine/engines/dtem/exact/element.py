@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.element import Elements, condense, packed_starts, refuse_indefinite
 from etc_engine.engines.dtem.exact.cut_disk import potentials_at, solve_cut_disk
 from etc_engine.engines.dtem.exact.lune import LEVELS, ChordPoints, chord_points
@@ -52,16 +52,16 @@ class Chords(NamedTuple):
         Sign of odd modes.
     """
 
-    offsets: NDArray[np.int64]
-    rows: NDArray[np.int64]
-    theta: NDArray[np.float64]
-    alpha: NDArray[np.float64]
-    exponents: NDArray[np.float64]
-    levels: NDArray[np.int64]
-    signs: NDArray[np.float64]
+    offsets: Ints
+    rows: Ints
+    theta: Floats
+    alpha: Floats
+    exponents: Floats
+    levels: Ints
+    signs: Floats
 
 
-def exact_elements(sides: ContactSides, conductivity: NDArray[np.float64], modes: int = MODES) -> Elements:
+def exact_elements(sides: ContactSides, conductivity: Floats, modes: int = MODES) -> Elements:
     """Conductivity matrices of all disks over (contact, mode).
 
     Parameters
@@ -105,9 +105,7 @@ def exact_elements(sides: ContactSides, conductivity: NDArray[np.float64], modes
     return Elements(modes, offsets, nodes, starts, values)
 
 
-def exact_potentials(
-    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def exact_potentials(sides: ContactSides, conductivity: Floats, flows: Floats) -> Floats:
     """Weighted mean temperature of every chord above that of its disk's centre, shape (s,), of flows (s, modes).
 
     Parameters
@@ -130,9 +128,7 @@ def exact_potentials(
     )
 
 
-def chords_of_field(
-    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
-) -> tuple[Chords, NDArray[np.float64]]:
+def chords_of_field(sides: ContactSides, conductivity: Floats, flows: Floats) -> tuple[Chords, Floats]:
     """Chords of a whole network with flows (s, modes), and the angle of wall contacts that cut nothing, else NaN."""
     uncut = np.zeros(sides.nodes.size, dtype=np.bool_)
     uncut[sides.of_walls] = ~flows[sides.of_walls].any(axis=1)
@@ -145,9 +141,9 @@ def chords_of_field(
 
 def cut_chords(
     sides: ContactSides,
-    conductivity: NDArray[np.float64],
-    uncut: NDArray[np.bool_] | None = None,
-    cut_rows: NDArray[np.int64] | None = None,
+    conductivity: Floats,
+    uncut: Flags | None = None,
+    cut_rows: Ints | None = None,
     *,
     modes: int,
 ) -> Chords:
@@ -168,7 +164,7 @@ def cut_chords(
     return Chords(offsets, rows, theta, alpha, exponents, levels, signs)
 
 
-def edge_exponents(sides: ContactSides, conductivity: NDArray[np.float64]) -> NDArray[np.float64]:
+def edge_exponents(sides: ContactSides, conductivity: Floats) -> Floats:
     """Exponent b of the flux (1 - s^2)^(b - 1) at the ends of each side's contact, shape (s,).
 
     Wedges of conductivity kappa_A, kappa_B and angles pi - alpha_A, pi - alpha_B that meet, insulated outside, have
@@ -187,9 +183,7 @@ def edge_exponents(sides: ContactSides, conductivity: NDArray[np.float64]) -> ND
     return exponents
 
 
-def _choose_levels(
-    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64], modes: int
-) -> NDArray[np.int64]:
+def _choose_levels(offsets: Ints, theta: Floats, alpha: Floats, modes: int) -> Ints:
     """The cheapest points that resolve each chord: neighbours' corners, its own, the sink, the modes."""
     enough = min((points for most, points in POINTS_OF_MODES if modes <= most), default=52)
     clearance = _clearances(offsets, theta, alpha)
@@ -213,9 +207,7 @@ def _choose_levels(
 
 
 @njit(cache=True)
-def _clearances(
-    offsets: NDArray[np.int64], theta: NDArray[np.float64], alpha: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _clearances(offsets: Ints, theta: Floats, alpha: Floats) -> Floats:
     """Distance of each chord's ends to the nearest end of another chord of its disk, in its half-widths."""
     clearance = np.full(theta.size, np.inf)
     for p in range(offsets.size - 1):
@@ -230,13 +222,13 @@ def _clearances(
 
 @njit(cache=True)
 def _fill(
-    side_offsets: NDArray[np.int64],
+    side_offsets: Ints,
     chords: Chords,
-    resistance: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
+    resistance: Floats,
+    conductivity: Floats,
     modes: int,
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
+    starts: Ints,
+    values: Floats,
     points: ChordPoints,
 ) -> int:
     """Fill the packed matrices; answers the first particle whose H is not positive definite, or -1."""
@@ -264,13 +256,13 @@ def _fill(
 @njit(cache=True)
 def _potentials(
     chords: Chords,
-    resistance: NDArray[np.float64],
-    conductivity: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    side_offsets: NDArray[np.int64],
-    arc_points: NDArray[np.float64],
+    resistance: Floats,
+    conductivity: Floats,
+    flows: Floats,
+    side_offsets: Ints,
+    arc_points: Floats,
     points: ChordPoints,
-) -> NDArray[np.float64]:
+) -> Floats:
     modes = flows.shape[1]
     potentials = np.zeros(resistance.size)
     for p in range(side_offsets.size - 1):
@@ -297,9 +289,7 @@ def _potentials(
 
 
 @njit(cache=True)
-def of_disk(
-    chords: Chords, p: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def of_disk(chords: Chords, p: int) -> tuple[Floats, Floats, Floats, Ints]:
     """Position angles, half-angles, exponents and levels of the chords of one disk."""
     own = slice(chords.offsets[p], chords.offsets[p + 1])
     return chords.theta[own], chords.alpha[own], chords.exponents[own], chords.levels[own]

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
 from etc_engine.engines.dtem.exact.element import Chords, chords_of_field, of_disk
 from etc_engine.engines.dtem.exact.lune import ChordPoints, chord_points
@@ -15,8 +16,8 @@ from etc_engine.medium.sides import ContactSides
 
 @njit(cache=True)
 def loaded_waves(
-    chords: Chords, p: int, flows: NDArray[np.float64], conductivity: float, points: ChordPoints
-) -> tuple[bool, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    chords: Chords, p: int, flows: Floats, conductivity: float, points: ChordPoints
+) -> tuple[bool, Floats, Floats, Floats]:
     """Whether disk p carries heat, its waves (see `chord_waves`), and the mean temperature over each chord and mode."""
     modes = flows.shape[1]
     first, count = chords.offsets[p], chords.offsets[p + 1] - chords.offsets[p]
@@ -39,11 +40,11 @@ def loaded_waves(
 
 def exact_temperatures(
     sides: ContactSides,
-    conductivity: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    particles: NDArray[np.int64],
-    points: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    conductivity: Floats,
+    flows: Floats,
+    particles: Ints,
+    points: Floats,
+) -> Floats:
     """Temperature at points inside cut disks above that of their centres, shape (q,).
 
     Parameters
@@ -68,12 +69,12 @@ def exact_temperatures(
 @njit(cache=True)
 def _inside(
     chords: Chords,
-    conductivity: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    particles: NDArray[np.int64],
+    conductivity: Floats,
+    flows: Floats,
+    particles: Ints,
     z: NDArray[np.complex128],
     points: ChordPoints,
-) -> NDArray[np.float64]:
+) -> Floats:
     values = np.zeros(z.size)
     start = 0
     while start < z.size:

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.exact.cut_disk import chord_point
 from etc_engine.engines.dtem.exact.element import Chords, cut_chords, of_disk
 from etc_engine.engines.dtem.exact.field import loaded_waves
@@ -38,7 +38,7 @@ SAMPLES = 33
 """Points of another chord."""
 
 
-def jump_energies(solution: SteadySolution, load: int = 0) -> NDArray[np.float64]:
+def jump_energies(solution: SteadySolution, load: int = 0) -> Floats:
     """Energy it takes to make the temperatures of ``exact`` continuous, by particle, shape (n,) [W K/m].
 
     Parameters
@@ -65,11 +65,11 @@ def jump_energies(solution: SteadySolution, load: int = 0) -> NDArray[np.float64
 @njit(cache=True)
 def _deviations(
     chords: Chords,
-    conductivity: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    chi: NDArray[np.float64],
+    conductivity: Floats,
+    flows: Floats,
+    chi: Floats,
     points: ChordPoints,
-    out: NDArray[np.float64],
+    out: Floats,
 ) -> None:
     """Temperature along the chord of every contact side above its weighted mean there."""
     modes = flows.shape[1]
@@ -89,11 +89,11 @@ def _deviations(
 @njit(cache=True)
 def _extension_energies(
     chords: Chords,
-    conductivity: NDArray[np.float64],
-    chi: NDArray[np.float64],
-    jumps: NDArray[np.float64],
-    slopes: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    conductivity: Floats,
+    chi: Floats,
+    jumps: Floats,
+    slopes: Floats,
+) -> Floats:
     """Energy of an extension of all jumps of each particle, (sum of the roots of one at a time) squared."""
     energies = np.zeros(chords.offsets.size - 1)
     for p in range(energies.size):
@@ -128,9 +128,9 @@ def _least_extension(
     height: float,
     reach: float,
     depth: float,
-    chi: NDArray[np.float64],
-    jump: NDArray[np.float64],
-    slope: NDArray[np.float64],
+    chi: Floats,
+    jump: Floats,
+    slope: Floats,
 ) -> float:
     """Smallest energy int |grad v|^2 among a few depths Y and ramps of a(x)."""
     least = np.inf

@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from etc_engine.arrays import Floats, Ints
 
 WAVE_STEP = 0.08
 """Step of the midpoint rule over k; its error exp(-2 pi b/step) is below 1e-17 for b >= 1/2."""
@@ -70,15 +71,15 @@ class ChordPoints(NamedTuple):
     waves : ndarray, shape (waves,)
     """
 
-    counts: NDArray[np.int64]
-    xi: NDArray[np.float64]
-    s: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    products: NDArray[np.float64]
-    cosines: NDArray[np.float64]
-    sines: NDArray[np.float64]
-    waves: NDArray[np.float64]
+    counts: Ints
+    xi: Floats
+    s: Floats
+    jacobian: Floats
+    weights: Floats
+    products: Floats
+    cosines: Floats
+    sines: Floats
+    waves: Floats
 
 
 def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
@@ -114,7 +115,7 @@ def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
 
 
 @njit(cache=True)
-def mode_values(s: float, b: float, out: NDArray[np.float64]) -> None:
+def mode_values(s: float, b: float, out: Floats) -> None:
     """Gegenbauer polynomials R_k(s) = C_k(s)/C_k(1) of order b - 1/2, orthogonal under (1 - s^2)^(b - 1)."""
     out[0] = 1.0
     if out.size > 1:
@@ -146,7 +147,7 @@ def mode_weights(
     b: float,
     level: int,
     points: ChordPoints,
-    out: NDArray[np.float64],
+    out: Floats,
 ) -> None:
     """Weights of the points that integrate a smooth function against phi_k(s) = R_k(s) (1 - s^2)^(b-1)/B, (M, points).
 
@@ -171,7 +172,7 @@ def mode_weights(
 
 
 @njit(cache=True)
-def mode_transforms(b: float, out: NDArray[np.float64]) -> None:
+def mode_transforms(b: float, out: Floats) -> None:
     """Fourier transforms over chi of the flux modes, (M, waves): cosine ones of even modes, sine ones of odd modes."""
     modes = out.shape[0]
     values = np.empty(modes)
@@ -199,9 +200,7 @@ def centre_constant(alpha: float) -> float:
 
 
 @njit(cache=True)
-def strip_symbols(
-    alpha: float, waves: NDArray[np.float64], flux: NDArray[np.float64], sink: NDArray[np.float64]
-) -> None:
+def strip_symbols(alpha: float, waves: Floats, flux: Floats, sink: Floats) -> None:
     """Midpoint weights of coth(kH)/k, and of cosh(k (H - y_O))/(k sinh(kH)), H = pi - alpha, y_O = pi - 2 alpha."""
     height = np.pi - alpha
     for n in range(waves.size):
@@ -216,9 +215,9 @@ def own_resistances(
     alpha: float,
     level: int,
     points: ChordPoints,
-    modes: NDArray[np.float64],
-    between: NDArray[np.float64],
-    towards: NDArray[np.float64],
+    modes: Floats,
+    between: Floats,
+    towards: Floats,
 ) -> None:
     """Kappa times the mean temperature, weighted by flux mode k, of unit densities on the same chord of a lone lune.
 

@@ -7,10 +7,13 @@ the resistances between all modes of a sphere: V of the full ball, L what the ca
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.element import (
     Elements,
     cholesky_inverse,
@@ -32,13 +35,37 @@ from etc_engine.laws.sphere_modes import (
 )
 from etc_engine.medium.sides import ContactSides, refuse_overlap
 
+
+class ContactDisks(NamedTuple):
+    """Contact disks and cuts of spheres as compiled code takes them, sorted by sphere.
+
+    Parameters
+    ----------
+    offsets : ndarray of int, shape (n + 1,)
+        Disks of sphere p: ``offsets[p]`` to ``offsets[p + 1]``.
+    normals : ndarray, shape (c, 3)
+        Unit directions.
+    axes : ndarray of complex, shape (c, 3)
+        E = e_1 + i e_2 across each.
+    alpha : ndarray, shape (c,) [rad]
+    cutting : ndarray of bool, shape (c,)
+        Whether the sphere ends at the disk.
+    """
+
+    offsets: Ints
+    normals: Floats
+    axes: NDArray[np.complex128]
+    alpha: Floats
+    cutting: Flags
+
+
 DEGREE = 2
 """Of the flux modes, unless another one is asked for."""
 RAISE = 1.0
 """Added to V between whole heat flows, which keeps it positive definite and changes no difference of temperatures."""
 
 
-def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64], modes: int) -> Elements:
+def exact_sphere_elements(sides: ContactSides, conductivity: Floats, modes: int) -> Elements:
     """Conductivity matrices of all spheres over (contact, mode).
 
     Parameters
@@ -78,11 +105,7 @@ def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64]
     values = np.zeros(int(starts[-1]))
     bad = _fill(
         sides.offsets,
-        offsets,
-        normals,
-        axes,
-        alpha,
-        np.ones(alpha.size, dtype=np.bool_),
+        ContactDisks(offsets, normals, axes, alpha, np.ones(alpha.size, dtype=np.bool_)),
         tables,
         own_blocks(tables, alpha),
         np.ascontiguousarray(conductivity * sides.radii),
@@ -95,9 +118,7 @@ def exact_sphere_elements(sides: ContactSides, conductivity: NDArray[np.float64]
     return Elements(modes, modes * sides.offsets, nodes, starts, values)
 
 
-def exact_sphere_potentials(
-    sides: ContactSides, conductivity: NDArray[np.float64], flows: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def exact_sphere_potentials(sides: ContactSides, conductivity: Floats, flows: Floats) -> Floats:
     """Weighted mean temperature of every contact above that of its sphere's centre, shape (s,), of flows (s, modes).
 
     Parameters
@@ -115,11 +136,7 @@ def exact_sphere_potentials(
     _refuse_wide(sides.offsets, normals, sides.alpha)
     potentials = np.zeros(sides.nodes.size)
     _potentials(
-        sides.offsets,
-        normals,
-        axes,
-        sides.alpha,
-        cutting,
+        ContactDisks(sides.offsets, normals, axes, sides.alpha, cutting),
         tables,
         own_blocks(tables, sides.alpha),
         np.ascontiguousarray(conductivity * sides.radii),
@@ -136,7 +153,7 @@ def _degree(modes: int) -> int:
     return degree
 
 
-def _refuse_wide(offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha: NDArray[np.float64]) -> None:
+def _refuse_wide(offsets: Ints, normals: Floats, alpha: Floats) -> None:
     refuse_overlap(offsets, normals, alpha)
     wide = np.flatnonzero(alpha > WIDEST)
     if wide.size:
@@ -147,7 +164,7 @@ def _refuse_wide(offsets: NDArray[np.int64], normals: NDArray[np.float64], alpha
         )
 
 
-def _frames(sides: ContactSides) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+def _frames(sides: ContactSides) -> tuple[Floats, NDArray[np.complex128]]:
     """Unit directions (s, 3), exactly opposite on the two sides of a contact, and E of each, the same on both."""
     normals = sides.arms / np.linalg.norm(sides.arms, axis=1, keepdims=True)
     normals[sides.of_contacts[:, 1]] = -normals[sides.of_contacts[:, 0]]
@@ -156,7 +173,7 @@ def _frames(sides: ContactSides) -> tuple[NDArray[np.float64], NDArray[np.comple
     return normals, axes
 
 
-def _across(normals: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _across(normals: Floats) -> NDArray[np.complex128]:
     """E = e_1 + i e_2 with e_1, e_2 orthonormal and across each direction, shape (s, 3)."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]
     first = np.cross(normals, least)
@@ -166,17 +183,14 @@ def _across(normals: NDArray[np.float64]) -> NDArray[np.complex128]:
 
 @njit(cache=True)
 def _resistances(
-    first: int,
-    last: int,
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
-    cutting: NDArray[np.bool_],
+    p: int,
+    disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
-    h: NDArray[np.float64],
+    h: Floats,
 ) -> bool:
-    """H = (V^-1 - L)^-1 of the disks ``first`` to ``last``, times kappa R; False if it is not positive definite."""
+    """H = (V^-1 - L)^-1 of the disks of sphere p, times kappa R; False if it is not positive definite."""
+    first, last = disks.offsets[p], disks.offsets[p + 1]
     families = tables.orders.size
     base = np.zeros(families + 1, dtype=np.int64)
     for f in range(families):
@@ -187,7 +201,7 @@ def _resistances(
     for i in range(n):
         _own_block(own.selves[first + i], tables, base, i * modes, 1.0, h)
         for j in range(i):
-            _pair_block(first + i, first + j, normals, axes, alpha, tables, base, means, i * modes, j * modes, h)
+            _pair_block((first + i, first + j), disks, tables, base, means, (i * modes, j * modes), h)
             for f in range(families):
                 h[i * modes + base[f], j * modes] -= own.gauges[first + i, f]
                 h[i * modes, j * modes + base[f]] -= own.gauges[first + j, f]
@@ -197,7 +211,7 @@ def _resistances(
     if not cholesky_inverse(h, n * modes):
         return False
     for i in range(n):
-        if cutting[first + i]:
+        if disks.cutting[first + i]:
             _own_block(own.caps[first + i], tables, base, i * modes, -1.0, h)
     if not cholesky_inverse(h, n * modes):
         return False
@@ -209,12 +223,12 @@ def _resistances(
 
 @njit(cache=True)
 def _own_block(
-    block: NDArray[np.float64],
+    block: Floats,
     tables: ModeTables,
-    base: NDArray[np.int64],
+    base: Ints,
     at: int,
     sign: float,
-    h: NDArray[np.float64],
+    h: Floats,
 ) -> None:
     """Add a block by family, the same for cosine and sine and nothing between different m."""
     for f in range(tables.orders.size):
@@ -226,19 +240,17 @@ def _own_block(
 
 @njit(cache=True)
 def _pair_block(
-    a: int,
-    b: int,
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
+    pair: tuple[int, int],
+    disks: ContactDisks,
     tables: ModeTables,
-    base: NDArray[np.int64],
-    means: NDArray[np.float64],
-    row: int,
-    column: int,
-    h: NDArray[np.float64],
+    base: Ints,
+    means: Floats,
+    at: tuple[int, int],
+    h: Floats,
 ) -> None:
     """<s_a, V s_b> of all modes of two disks; cos and sin are (E + E*)/2 and (E - E*)/(2i)."""
+    (a, b), (row, column) = pair, at
+    normals, axes, alpha = disks.normals, disks.axes, disks.alpha
     cosine = 0.0
     along, back, straight, crossed = 0j, 0j, 0j, 0j
     for axis in range(3):
@@ -265,18 +277,14 @@ def _pair_block(
 
 @njit(cache=True)
 def _fill(
-    side_offsets: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
-    cutting: NDArray[np.bool_],
+    side_offsets: Ints,
+    disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
-    scales: NDArray[np.float64],
-    resistance: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    values: NDArray[np.float64],
+    scales: Floats,
+    resistance: Floats,
+    starts: Ints,
+    values: Floats,
 ) -> int:
     """Fill the packed matrices; returns the first particle whose H is not positive definite, or -1."""
     modes = 0
@@ -284,11 +292,11 @@ def _fill(
         modes += 1 if m == 0 else 2
     for p in range(side_offsets.size - 1):
         first, contacts = side_offsets[p], side_offsets[p + 1] - side_offsets[p]
-        size, every = contacts * modes, (offsets[p + 1] - offsets[p]) * modes
+        size, every = contacts * modes, (disks.offsets[p + 1] - disks.offsets[p]) * modes
         if contacts < 1:
             continue
         h = np.empty((every, every))  # the disks of contacts come before those of insulated walls
-        if not _resistances(offsets[p], offsets[p + 1], normals, axes, alpha, cutting, tables, own, h):
+        if not _resistances(p, disks, tables, own, h):
             return p
         h /= scales[p]
         for a in range(contacts):
@@ -301,25 +309,21 @@ def _fill(
 
 @njit(cache=True)
 def _potentials(
-    offsets: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    axes: NDArray[np.complex128],
-    alpha: NDArray[np.float64],
-    cutting: NDArray[np.bool_],
+    disks: ContactDisks,
     tables: ModeTables,
     own: OwnBlocks,
-    scales: NDArray[np.float64],
-    flows: NDArray[np.float64],
-    potentials: NDArray[np.float64],
+    scales: Floats,
+    flows: Floats,
+    potentials: Floats,
 ) -> None:
     """H times the flux modes, of mode 0."""
     modes = flows.shape[1]
-    for p in range(offsets.size - 1):
-        first, n = offsets[p], offsets[p + 1] - offsets[p]
+    for p in range(disks.offsets.size - 1):
+        first, n = disks.offsets[p], disks.offsets[p + 1] - disks.offsets[p]
         if not np.any(flows[first : first + n]):
             continue
         h = np.empty((n * modes, n * modes))
-        _resistances(first, first + n, normals, axes, alpha, cutting, tables, own, h)
+        _resistances(p, disks, tables, own, h)
         for i in range(n):
             for j in range(n):
                 for k in range(modes):

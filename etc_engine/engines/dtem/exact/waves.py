@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.exact.cut_disk import chord_point
 from etc_engine.engines.dtem.exact.lune import (
     SINK_WAVES,
@@ -29,14 +29,14 @@ from etc_engine.engines.dtem.exact.lune import (
 
 @njit(cache=True)
 def chord_waves(
-    alpha: NDArray[np.float64],
-    exponents: NDArray[np.float64],
-    levels: NDArray[np.int64],
-    offsets: NDArray[np.int64],
-    densities: NDArray[np.float64],
-    coefficients: NDArray[np.float64],
+    alpha: Floats,
+    exponents: Floats,
+    levels: Ints,
+    offsets: Ints,
+    densities: Floats,
+    coefficients: Floats,
     points: ChordPoints,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Transforms (chords, 2, waves) of the flux on each chord, and its net flow and constant (chords, 2).
 
     ``densities`` are the smooth ones of the loaded disk at the points of its chords, ``coefficients`` the flux
@@ -72,7 +72,7 @@ def _in_strip(
     x: float,
     y: float,
     alpha: float,
-    transforms: NDArray[np.float64],
+    transforms: Floats,
     net: float,
 ) -> float:
     """Temperature of one lune solution at a point of its strip, but for its constant."""
@@ -102,10 +102,10 @@ def temperature_at(
     z: complex,
     on: int,
     chi: float,
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    transforms: NDArray[np.float64],
-    constants: NDArray[np.float64],
+    theta: Floats,
+    alpha: Floats,
+    transforms: Floats,
+    constants: Floats,
 ) -> float:
     """Kappa times the temperature above O at a point of the disk; if ``on`` >= 0 the point chi of that chord."""
     value = 0.0
@@ -122,12 +122,12 @@ def temperature_at(
 @njit(cache=True)
 def chord_trace(
     on: int,
-    chi: NDArray[np.float64],
-    theta: NDArray[np.float64],
-    alpha: NDArray[np.float64],
-    transforms: NDArray[np.float64],
-    constants: NDArray[np.float64],
-    out: NDArray[np.float64],
+    chi: Floats,
+    theta: Floats,
+    alpha: Floats,
+    transforms: Floats,
+    constants: Floats,
+    out: Floats,
 ) -> None:
     """Kappa times the temperature above O along a chord, at s = tanh(chi/2)."""
     for n in range(chi.size):
