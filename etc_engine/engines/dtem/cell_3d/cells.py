@@ -80,7 +80,8 @@ class CellSystem:
     starts : ndarray, shape (n + 1,)
         Unknowns ``starts[i] : starts[i + 1]`` of the lists below belong to cell i.
     unknowns : ndarray, shape (u,)
-        Number of each unknown of each cell: vertices first, then edge bubbles, then facet bubbles.
+        Number of each unknown of each cell: vertices first, then edge bubbles, then facets. The first unknown of a
+        facet is the temperature of its middle (of its contact disk, if it has one), the others are bubbles.
     arms : ndarray, shape (u, 3) [m]
         Field of unit gradient in each direction that is zero at the cell's centre.
     blocks : ndarray, shape (size + 1,)
@@ -105,6 +106,16 @@ class CellSystem:
     def size(self) -> int:
         """Number of unknowns."""
         return int(self.blocks[-1])
+
+    @property
+    def is_temperature(self) -> NDArray[np.bool_]:
+        """Unknowns that are temperatures of points or disks, vertices and middles; the others are bubbles."""
+        marks = np.zeros(self.size, dtype=np.bool_)
+        marks[: self.vertices] = True
+        facets = self.vertices + self.topology.edge_count
+        start, count = self.blocks[facets:-1], np.diff(self.blocks[facets:])
+        marks[start[count > 0]] = True
+        return marks
 
     @property
     def vertices(self) -> int:
@@ -184,26 +195,29 @@ def build_cells(
         (on_edges, on_faces, powers),
     )
     tables = (radial_moments(fineness.radial_degree), rule, green_table())
-    matrices, unknowns, means, nodes = [], [], [], np.zeros(len(radii), dtype=np.int64)
+    matrices, unknowns, means, arms, nodes = [], [], [], [], np.zeros(len(radii), dtype=np.int64)
     for cell in range(len(radii)):
         media = (radii[cell], materials.spheres[cell], materials.fluid, resistances[cell])
-        matrix, inside, weights, nodes[cell] = cell_energy(cell, *arguments, media, tables)
+        matrix, inside, weights, nodes[cell], columns, middles = cell_energy(cell, *arguments, media, tables)
         own = _unknowns(cell, topology, blocks)
         left, mean = eliminate(matrix, inside, weights, definite=not len(resistances[cell]))
         matrices.append(left[np.tril_indices(len(left))])
         unknowns.append(own)
         means.append(mean)
+        faces = topology.side_faces[topology.side_starts[cell] : topology.side_starts[cell + 1]]
+        own_arms, own_vertices = np.zeros((len(own), 3)), slice(*topology.vertex_starts[cell : cell + 2])
+        own_arms[: own_vertices.stop - own_vertices.start] = plan.arms[own_vertices]
+        with_middle = on_faces[faces] > 0
+        own_arms[columns[with_middle]] = middles[with_middle]
+        arms.append(own_arms)
     starts = np.concatenate(([0], np.cumsum([len(own) for own in unknowns]))).astype(np.int64)
-    arms = np.zeros((int(starts[-1]), 3))
-    corner = np.arange(len(topology.vertices)) - np.repeat(topology.vertex_starts[:-1], np.diff(topology.vertex_starts))
-    arms[corner + np.repeat(starts[:-1], np.diff(topology.vertex_starts))] = plan.arms
     return CellSystem(
         topology,
         plan,
         np.concatenate(matrices),
         starts,
         np.concatenate(unknowns),
-        arms,
+        np.concatenate(arms),
         blocks,
         np.concatenate(means),
         nodes,

@@ -57,9 +57,11 @@ def cell_sizes(cell, topology, mesh, frame):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: ignore[no-untyped-def]  # noqa: PLR0915
-    """Energy of one cell over bubbles of edge nodes, rim, contact flows and frame; where the frame begins; rim nodes.
+    """Energy of one cell over bubbles of edge nodes, rim, contact flows and frame.
 
-    Every side of a facet adds its shell, the sphere k R S G S over the rim (`add_sphere`).
+    Every side of a facet adds its shell, the sphere k R S G S over the rim (`add_sphere`). Returns the matrix; where
+    the frame begins; weights of the mean rim temperature; the number of rim nodes; and for every side the place of its
+    bubbles in the frame, and its middle from the centre.
     """
     side_starts, side_faces, side_ends, starts, edge_of_corner, vertex_starts, edge_starts, edges = topology[:8]
     corner_vertices, corner_edges, forward = topology[8:]
@@ -81,6 +83,7 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
     first = first_flow + flows
     matrix = np.zeros((first + columns, first + columns))
     directions, angles = np.zeros((nodes, 3)), np.zeros(nodes)
+    arms = np.zeros((len(side_places), 3))
     normals, sines = np.zeros((flows, 3)), np.zeros(flows)
     room = 0
     for s in range(len(side_places)):
@@ -93,7 +96,7 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
         span = slice(starts[face], starts[face + 1])
         own_edges = edge_of_corner[span]
         count = face_bubbles[face]
-        local, rim, own_angles, points, inner, mean = side_energy(
+        local, rim, own_angles, points, inner, mean, arm = side_energy(
             corners[span],
             (pieces[own_edges], forward[span], edge_bubbles[own_edges]),
             powers[:count],
@@ -130,6 +133,9 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
             for b in range(len(local)):
                 matrix[where[a], where[b]] += local[a, b]
         sign = 1.0 if end == 0 else -1.0
+        height = sign * (radius + heights[face, end, 0])
+        for axis in range(3):
+            arms[s, axis] = height * axes[face, 0, axis] + arm[0] * axes[face, 1, axis] + arm[1] * axes[face, 2, axis]
         for a in range(n):
             node = where[first_own + a] - first_rim
             angles[node] += own_angles[a]
@@ -160,7 +166,7 @@ def cell_energy(cell, topology, geometry, mesh, frame, media, tables):  # type: 
     )
     weights = np.zeros(first)  # mean of u over the sphere's surface
     weights[first_rim:first_flow] = angles / angles.sum()
-    return matrix, first, weights, nodes
+    return matrix, first, weights, nodes, side_columns, arms
 
 
 @njit(cache=True)

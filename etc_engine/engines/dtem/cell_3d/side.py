@@ -34,6 +34,22 @@ def disk_mean(nodes, basis, level, rings_inside, pieces):  # type: ignore[no-unt
 
 
 @njit(cache=True)
+def use_as_unknown(basis, mean, column):  # type: ignore[no-untyped-def]
+    """Make the temperature of the facet's middle, `mean` over the frame, the unknown of a column, in place.
+
+    With it a uniform temperature has equal unknowns at vertices and middles, as multigrid expects.
+    """
+    nodes, columns, scale = basis.shape[0], basis.shape[1], mean[column]
+    for a in range(nodes):
+        value = basis[a, column] / scale
+        for c in range(columns):
+            basis[a, c] -= mean[c] * value
+        basis[a, column] = value
+    for c in range(columns):
+        mean[c] = 1.0 if c == column else 0.0
+
+
+@njit(cache=True)
 def side_positions(boundary, center, levels, level, ray, heights, disk):  # type: ignore[no-untyped-def]
     """Nodes of this side around the disk and on it: positions (2, n, 2) and heights above the sphere's radius (2, n).
 
@@ -125,7 +141,7 @@ def side_energy(corners, edges, bubbles, mesh, side, tables):  # type: ignore[no
     `edges` = (pieces, forward, bubbles) of the facet's edges; `mesh` = (centre of the fan, levels of its rings, radius
     of its circle common to both sides, whether that is a contact disk); `side` = (heights, disk, radius, fluid).
     Returns the matrix of `condense`, stiffness and solid angles of the rim, unit directions of the nodes, the number
-    of inner nodes, and the mean of the frame over the contact disk.
+    of inner nodes, the temperature of the facet's middle over the frame, and where the middle lies in the plane.
     """
     moments, rule = tables
     center, levels, circle, contact = mesh
@@ -138,16 +154,23 @@ def side_energy(corners, edges, bubbles, mesh, side, tables):  # type: ignore[no
     basis = face_basis(common, triangles, inner, edges, bubbles, rule)
     nodes, offsets = side_positions(boundary, center, levels, level, ray, heights, own_disk)
     energy, rim, angles = shell_matrices(nodes, offsets, triangles, on_disk, (radius, fluid), moments, rule)
-    mean = np.zeros(basis.shape[1])
     if contact:
         inside = 0
         while inside < len(levels) and levels[inside] <= 1.0:
             inside += 1
         mean = disk_mean(common, basis, level, inside, pieces)
+    else:
+        mean = basis[0].copy()
+    arm = np.zeros(2)
+    for k in range(len(corners)):
+        for axis in range(2):
+            arm[axis] += mean[k] * corners[k, axis]
+    if len(bubbles) > 0:
+        use_as_unknown(basis, mean, basis.shape[1] - len(bubbles))
     n = len(level)
     points = np.empty((n, 3))
     for a in range(n):
         x, y, z = radius + offsets[0, a], nodes[0, a, 0], nodes[0, a, 1]
         norm = np.sqrt(x * x + y * y + z * z)
         points[a, 0], points[a, 1], points[a, 2] = x / norm, y / norm, z / norm
-    return condense(energy, basis, level, inner, contact), rim, angles, points, inner, mean
+    return condense(energy, basis, level, inner, contact), rim, angles, points, inner, mean, arm

@@ -213,10 +213,13 @@ def solve_sphere_cells(cells: SphereCells, axes: tuple[int, ...], *, tolerance: 
 
 
 def _at_wall(system: CellSystem, wall: int, heat: Floats) -> float:
-    """Sum of the heat at the vertices of a wall."""
-    polygons = system.topology.polygons
-    corners = np.repeat(wall_facets(system, wall), np.diff(polygons.starts))
-    return float(heat[np.unique(polygons.corners[corners])].sum())
+    """Sum of the heat at the vertices and the middles of the facets of a wall."""
+    topology = system.topology
+    facets = wall_facets(system, wall)
+    corners = np.repeat(facets, np.diff(topology.polygons.starts))
+    middles = system.blocks[system.vertices + topology.edge_count + np.flatnonzero(facets)]
+    numbers = np.concatenate((np.unique(topology.polygons.corners[corners]), middles))
+    return float(heat[numbers[system.is_temperature[numbers]]].sum())
 
 
 def sphere_cell_conductivity(

@@ -67,20 +67,24 @@ def _load(matrices, starts, unknowns, arms, size):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def _blocks(matrices, starts, unknowns, blocks, block_of, vertices):  # type: ignore[no-untyped-def]
-    """Diagonal blocks of edges and facets, one after the other, and the vertices' matrix as (row, column, value)."""
-    places = np.zeros(len(blocks), dtype=np.int64)
-    for b in range(vertices, len(blocks) - 1):
-        places[b + 1] = places[b] + (blocks[b + 1] - blocks[b]) ** 2
+def _split(matrices, starts, unknowns, coarse_of, group_of, first_of, widths):  # type: ignore[no-untyped-def]
+    """The matrix of the coarse unknowns as (row, column, value), and the diagonal blocks of the others in a row.
+
+    `coarse_of` numbers the coarse unknowns, -1 for the others; these belong to group `group_of`, whose first unknown is
+    `first_of` and which has `widths` of them.
+    """
+    places = np.zeros(len(widths) + 1, dtype=np.int64)
+    for g in range(len(widths)):
+        places[g + 1] = places[g] + widths[g] ** 2
     diagonal = np.zeros(places[-1])
-    corners = 0
+    pairs = 0
     for cell in range(len(starts) - 1):
         n = 0
-        while n < starts[cell + 1] - starts[cell] and unknowns[starts[cell] + n] < vertices:
-            n += 1
-        corners += n * n
-    rows, columns = np.empty(corners, dtype=np.int64), np.empty(corners, dtype=np.int64)
-    values = np.empty(corners)
+        for i in range(starts[cell], starts[cell + 1]):
+            n += coarse_of[unknowns[i]] >= 0
+        pairs += n * n
+    rows, columns = np.empty(pairs, dtype=np.int32), np.empty(pairs, dtype=np.int32)
+    values = np.empty(pairs)
     at, found = 0, 0
     for cell in range(len(starts) - 1):
         own = unknowns[starts[cell] : starts[cell + 1]]
@@ -88,23 +92,19 @@ def _blocks(matrices, starts, unknowns, blocks, block_of, vertices):  # type: ig
             for j in range(i + 1):
                 k, r, c = matrices[at], own[i], own[j]
                 at += 1
-                if r < vertices:
-                    rows[found], columns[found], values[found] = r, c, k
-                    found += 1
-                    if j < i:
-                        rows[found], columns[found], values[found] = c, r, k
+                for turn in range(2 if j < i else 1):
+                    u, v = (r, c) if turn == 0 else (c, r)
+                    if coarse_of[u] >= 0 and coarse_of[v] >= 0:
+                        rows[found], columns[found], values[found] = coarse_of[u], coarse_of[v], k
                         found += 1
-                elif block_of[r] == block_of[c]:
-                    b = block_of[r]
-                    width = blocks[b + 1] - blocks[b]
-                    diagonal[places[b] + (r - blocks[b]) * width + c - blocks[b]] += k
-                    if j < i:
-                        diagonal[places[b] + (c - blocks[b]) * width + r - blocks[b]] += k
-    return diagonal, rows, columns, values
+                    elif coarse_of[u] < 0 and coarse_of[v] < 0 and group_of[u] == group_of[v]:
+                        g = group_of[u]
+                        diagonal[places[g] + (u - first_of[g]) * widths[g] + v - first_of[g]] += k
+    return diagonal, places, rows[:found], columns[:found], values[:found]
 
 
 def cell_preconditioner(system: CellSystem, fixed: NDArray[np.bool_]) -> Preconditioner:
-    """Block-diagonal preconditioner: vertices by multigrid, every edge and facet by its own block.
+    """Block-diagonal preconditioner: temperatures by multigrid, the bubbles of every edge and facet by their own block.
 
     Parameters
     ----------
@@ -112,42 +112,40 @@ def cell_preconditioner(system: CellSystem, fixed: NDArray[np.bool_]) -> Precond
     fixed : ndarray of bool, shape (size,)
         Unknowns that are given; blocks are free or fixed as a whole.
     """
-    free = ~fixed
     start = time.perf_counter()
-    sizes = np.diff(system.blocks)
-    block_of = np.repeat(np.arange(len(sizes)), sizes)
-    vertices = system.vertices
-    diagonal, rows, columns, values = _blocks(
-        system.matrices, system.starts, system.unknowns, system.blocks, block_of, vertices
+    coarse = np.flatnonzero(system.is_temperature)
+    coarse_of = np.full(system.size, -1)
+    coarse_of[coarse] = np.arange(len(coarse))
+    others = np.flatnonzero(coarse_of < 0)
+    block = np.repeat(np.arange(len(system.blocks) - 1), np.diff(system.blocks))
+    group_of = np.full(system.size, -1)
+    _, first, group_of[others], widths = np.unique(
+        block[others], return_index=True, return_inverse=True, return_counts=True
     )
-    matrix = csr_matrix((values, (rows, columns)), shape=(vertices, vertices))
-    kept = np.flatnonzero(free[:vertices])
-    coarse = build_preconditioner(csr_matrix(matrix[kept][:, kept])) if len(kept) else None
+    first_of = others[first]
+    diagonal, places, rows, columns, values = _split(
+        system.matrices, system.starts, system.unknowns, coarse_of, group_of, first_of, widths
+    )
+    matrix = csr_matrix((values, (rows, columns)), shape=(len(coarse), len(coarse)))
+    kept = np.flatnonzero(~fixed[coarse])
+    inner = build_preconditioner(csr_matrix(matrix[kept][:, kept])) if len(kept) else None
     groups: list[tuple[Integers, Floats]] = []
-    places = np.concatenate((np.zeros(vertices, dtype=np.int64), np.cumsum(sizes[vertices:] ** 2)))
-    places = np.concatenate(([0], places))[: len(sizes)]
-    for width in np.unique(sizes[vertices:]):
-        if width == 0:
-            continue
-        chosen = vertices + np.flatnonzero(sizes[vertices:] == width)
-        chosen = chosen[free[system.blocks[chosen]]]
+    for width in np.unique(widths):
+        chosen = np.flatnonzero((widths == width) & ~fixed[first_of])
         entries = diagonal[places[chosen][:, None] + np.arange(width * width)].reshape(-1, width, width)
-        groups.append(
-            (
-                system.blocks[chosen][:, None] + np.arange(width),
-                np.linalg.pinv(entries, rcond=DEPENDENT, hermitian=True),
-            )
-        )
+        inverse = np.linalg.pinv(entries, rcond=DEPENDENT, hermitian=True)
+        groups.append((first_of[chosen][:, None] + np.arange(width), inverse))
+    unknowns = coarse[kept]
 
     def apply(residual: Floats) -> Floats:
         result = np.zeros_like(residual)
-        if coarse is not None:
-            result[kept] = coarse.apply(residual[kept])
+        if inner is not None:
+            result[unknowns] = inner.apply(residual[unknowns])
         for numbers, inverse in groups:
             result[numbers] = np.einsum("bij,bj->bi", inverse, residual[numbers])
         return result
 
-    return Preconditioner(apply, coarse.levels if coarse else 1, time.perf_counter() - start)
+    return Preconditioner(apply, inner.levels if inner else 1, time.perf_counter() - start)
 
 
 def fixed_unknowns(system: CellSystem, axis: int, periodic: bool) -> NDArray[np.bool_]:
@@ -224,6 +222,6 @@ def solve_cells(
         preconditioner=cell_preconditioner(system, fixed),
         tolerance=tolerance,
         limits=Limits(max_iterations=MOST_ITERATIONS),
-        conserved=np.where(~fixed & (np.arange(system.size) < system.vertices), 1.0, 0.0),
+        conserved=np.where(~fixed & system.is_temperature, 1.0, 0.0),
     )
     return u, reports
