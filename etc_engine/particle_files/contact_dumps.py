@@ -43,6 +43,8 @@ NAMED = {
     "pos": (("x1", "y1", "z1", "x2", "y2", "z2"),),
 }
 """Names of columns by which a dump may tell them itself."""
+FAR = 1e6
+"""Box lengths beyond which no image of a particle is looked for."""
 PLACED = 1e-3
 """Centres in the contact dump may differ from those of the particles by this part of a radius."""
 
@@ -183,7 +185,11 @@ def _check_places(table: ParticleTable, contacts: ContactTable, rows: Ints) -> N
         known = np.flatnonzero(rows[:, side] >= 0)
         who = rows[known, side]
         places = contacts.columns["pos"][known, 3 * side : 3 * side + d] - origin
-        apart = np.linalg.norm(packing.box.minimum_image(places - packing.centers[who]), axis=1)
+        away = places - packing.centers[who]
+        away[~(np.abs(away) <= FAR * np.asarray(packing.box.lengths))] = np.inf
+        apart = np.full(known.size, np.inf)
+        near = np.isfinite(away).all(axis=1)
+        apart[near] = np.linalg.norm(packing.box.minimum_image(away[near]), axis=1)
         bad = np.flatnonzero(~(apart <= PLACED * packing.radii[who]))
         if bad.size:
             first = known[bad[0]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -113,7 +114,7 @@ def _labelled(path: Path, values: NDArray[np.generic]) -> LabelImage:
 def _numpy(path: Path) -> NDArray[np.generic]:
     try:
         return np.asarray(np.load(path, allow_pickle=False))
-    except (ValueError, OSError, EOFError) as error:
+    except Exception as error:  # a damaged header raises errors of many kinds
         raise InputError(f"{path} cannot be read as a NumPy array: {error}") from None
 
 
@@ -121,10 +122,14 @@ def _tiff(path: Path) -> NDArray[np.generic]:
     if find_spec("tifffile") is None:
         raise InputError("TIFF needs the library tifffile: install the extra with pip install 'etc-engine[images]'")
     tifffile = import_module("tifffile")
+    logger = logging.getLogger("tifffile")
+    quiet, logger.disabled = logger.disabled, True  # what goes wrong is raised
     try:
         pages = np.asarray(tifffile.imread(path))
     except Exception as error:  # the library raises errors of many kinds for damaged files
         raise InputError(f"{path} cannot be read as TIFF: {error}") from None
+    finally:
+        logger.disabled = quiet
     if pages.ndim == 4 and pages.shape[-1] in (3, 4):
         raise InputError(f"{path} is a colour image: labels of phases are one number per voxel")
     return pages.T

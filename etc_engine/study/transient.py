@@ -20,10 +20,12 @@ from etc_engine.study.schema import (
     AS_NUMBER,
     AS_TABLE,
     MOST_STEPS,
+    NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
     WRITTEN,
     Flag,
+    NotNegative,
     Number,
     Positive,
     Steps,
@@ -81,7 +83,7 @@ class Conduction(StudyTable):
     """``[conduction]``: the engine and its method."""
 
     engine: Engine = Field(default="dtem", description="dtem or pipe")
-    method: Word = Field(default="chord", description="a method of the engine")
+    method: Word = Field(default="", description="a method of the engine")
     dipoles: Flag = Field(default=False, description="true or false")
 
     @model_validator(mode="after")
@@ -89,11 +91,20 @@ class Conduction(StudyTable):
         if self.engine not in TRANSIENT:
             raise ValueError(f"engine: found {self.engine!r}, a transient takes {' or '.join(TRANSIENT)}")
         allowed = TRANSIENT[self.engine]
-        if self.method not in allowed:
+        if self.method and self.method not in allowed:
             raise ValueError(f"method: found {self.method!r}, allowed with {self.engine}: {', '.join(allowed)}")
-        if self.dipoles and "dipoles" not in ENGINES[self.engine].methods[self.method].options:
+        if self.dipoles and not any("dipoles" in ENGINES[self.engine].methods[word].options for word in self.words):
             raise ValueError(f"dipoles have no meaning with engine = {self.engine!r}: a particle has one temperature")
         return self
+
+    @property
+    def words(self) -> list[str]:
+        """The method, or those that the engine has where none is given."""
+        return [self.method] if self.method else TRANSIENT[self.engine]
+
+    def method_for(self, dimension: int, pores_conduct: bool) -> str:
+        """The method, by default that of the engine for a dimension and its pores."""
+        return self.method or ENGINES[self.engine].default_method(dimension, pores_conduct)
 
 
 TRANSIENT = {
@@ -152,6 +163,19 @@ class ParticlesTable(StudyTable):
         description=f"{NUMBER} [K], a list of such, one for each particle, a table such as "
         "{ value = 0.0, gradient = [1.0, 0.0] }, or 'file': the temperatures of the particle file"
     )
+
+
+class PoresTable(StudyTable):
+    """``[pores]``: the fluid between the particles, at rest."""
+
+    conductivity: NotNegative = Field(default=0.0, description=f"{NOT_NEGATIVE} [W/(m K)]")
+    heat_capacity: NotNegative = Field(default=0.0, description=f"{NOT_NEGATIVE}: rho c [J/(m3 K)]")
+
+    @model_validator(mode="after")
+    def _check(self) -> PoresTable:
+        if self.heat_capacity > 0.0 and self.conductivity == 0.0:
+            raise ValueError("heat_capacity: the pores store heat only if they conduct, give a conductivity")
+        return self
 
 
 class Time(StudyTable):
@@ -217,6 +241,7 @@ class NetworkStudy(StudyFile):
     ] = Field(description="a table with files, or with the words of the command pack")
     particles: ParticlesTable = Field(description="a table with heat_capacity and initial")
     contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
+    pores: PoresTable = Field(default_factory=PoresTable, description="a table with conductivity")
     conduction: Conduction = Field(default_factory=Conduction, description="a table")
     walls: WallsTable = Field(default_factory=WallsTable, description="a table")
     source: list[Source] = Field(default=[], description="tables [[source]] with heat and particles")
@@ -232,6 +257,7 @@ class NetworkStudy(StudyFile):
                 raise ValueError("seed: [packing] draws random numbers, give a whole number")
         if self.motion is None and not self.time.times:
             raise ValueError("time.times: missing, expected the output times; the first one is the start")
+        self._check_pores()
         if self.motion is not None:
             self._check_motion(self.motion)
         try:
@@ -242,6 +268,19 @@ class NetworkStudy(StudyFile):
             if row.table == "contacts" and isinstance(getattr(self.contacts, row.key), tuple):
                 raise ValueError(f"{row.place}: a transient takes one value, found a list")
         return self
+
+    def _check_pores(self) -> None:
+        """The method takes heat through the pores, or not, as they conduct."""
+        methods = ENGINES[self.conduction.engine].methods
+        word, conduct = self.conduction.method, self.pores.conductivity > 0.0
+        able = [name for name, row in methods.items() if row.transient and (row.pores != "no") is conduct]
+        if word and word not in able and methods[word].pores != "may":
+            what = "conduct" if conduct else "do not conduct"
+            raise ValueError(f"conduction.method: found {word!r}, allowed where the pores {what}: {', '.join(able)}")
+        if conduct and not able:
+            raise ValueError(f"pores.conductivity: engine {self.conduction.engine} takes no heat through the pores")
+        if conduct and self.motion is not None:
+            raise ValueError("pores.conductivity: with [motion] the pores do not conduct, take it out")
 
     def _check_motion(self, motion: Motion) -> None:
         """Frames of a dump, and their times."""

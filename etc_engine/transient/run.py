@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.box import parse_periodic
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
-from etc_engine.medium.medium import Medium
+from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.transient import HeatSource, ParticleSystem
 from etc_engine.medium.walls import knots_of, value_at
@@ -223,12 +223,13 @@ class _Physics:
         """The system of a contact network, with given heat capacities of the particles or the study's."""
         conduction = self.study.conduction
         heat_capacity = np.asarray(self.study.particles.heat_capacity, dtype=np.float64)
-        medium = Medium(network.packing, np.asarray(self.conductivity), network, heat_capacity=heat_capacity)
+        pores = Pores(self.study.pores.conductivity, self.study.pores.heat_capacity)
+        medium = Medium(network.packing, np.asarray(self.conductivity), network, pores, heat_capacity)
         return transient_system(
             medium,
             self.study.walls.conditions(),
             engine=conduction.engine,
-            method=conduction.method,
+            method=conduction.method_for(medium.dimension, pores.conduct),
             source=self.source,
             capacities=capacities,
             **({"dipoles": True} if conduction.dipoles else {}),
