@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from etc_engine.errors import InputError
 from etc_engine.realization import Status
 from etc_engine.study.sweep import study_of
-from etc_engine.sweep.dataset import INCIDENTAL, assemble, same_bits
+from etc_engine.sweep.dataset import INCIDENTAL, PERCOLATION, assemble, same_bits
 from etc_engine.sweep.plan import Unit
 from etc_engine.sweep.sweep import Realize, run_unit
 from etc_engine.sweep.table import tabulate
@@ -79,10 +79,11 @@ def rerun(
 
 def _unit_variables(cell: xarray.Dataset) -> xarray.Dataset:
     """What belongs to one realization and is the same wherever it runs."""
+    statistics = {"count", *PERCOLATION}
     names = [
         name
-        for name in cell.data_vars
-        if not str(name).endswith(INCIDENTAL) and not str(name).startswith("conductivity_") and str(name) != "count"
+        for name in map(str, cell.data_vars)
+        if not name.endswith(INCIDENTAL) and not name.startswith("conductivity_") and name not in statistics
     ]
     return cell[names]
 
