@@ -16,7 +16,7 @@ from etc_engine.engines.dtem.cell.steady import build_model, solve_model
 def main(disks: float = 1e4, contrast: float = 100.0) -> None:
     mean = np.sqrt(0.8 / np.pi / disks)
     radii = parse_radii(f"uniform:{0.67 * mean}:{1.33 * mean}")
-    packing = pack(PackingSpec("advancing-front", Box((1.0, 1.0)), radii), np.random.default_rng(3))
+    packing = pack(PackingSpec("advancing-front", radii, Box((1.0, 1.0))), np.random.default_rng(3))
     for run in ("first (compiles)", "second"):
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         times = [time.process_time()]
