@@ -20,7 +20,7 @@ LONGEST_NAME = 80
 MOVED = {
     "composite": "[pores] conductivity, [particles] conductivity and [conduction] resolution or particles",
     "composite.matrix_conductivity": "pores.conductivity",
-    "composite.contrast": "particles.conductivity, a list, with pores.conductivity",
+    "composite.contrast": "a list particles.conductivity",
     "composite.resolution": "conduction.resolution",
     "composite.nodes": "conduction.particles",
     "models.pore_conductivity": "pores.conductivity",
@@ -155,6 +155,9 @@ def _translation(content: Mapping[str, Any]) -> str:
     inner = [(f"{key}.{name}", key) for key, table in content.items() if isinstance(table, Mapping) for name in table]
     flat = [(key, key) for key, value in content.items() if not isinstance(value, Mapping)]
     found = [f"{MOVED[place]} for {place}" for place, _ in (*flat, *inner) if place in MOVED]
+    conduction = content.get("conduction")
+    if isinstance(conduction, Mapping) and conduction.get("method") == "pipe":
+        found.append("engine = 'pipe' for method = 'pipe'")
     if "material" in content:
         found.append(f"{MOVED['material']} for [material]")
     edges = [edge.get("type") for edge in content.get("boundary", []) if isinstance(edge, Mapping)]

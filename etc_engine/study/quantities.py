@@ -263,8 +263,8 @@ def with_quantities(table: str) -> Callable[[type[T]], type[T]]:
     >>> @with_quantities("pores")
     ... class Pores(QuantityTable):
     ...     pass
-    >>> Pores.model_validate({"conductivity": [0.04, 0.02]}).model_dump()
-    {'conductivity': (0.02, 0.04)}
+    >>> Pores.model_validate({"conductivity": [0.04, 0.02]}).conductivity
+    (0.02, 0.04)
     """
 
     def extended(cls: type[T]) -> type[T]:

@@ -5,6 +5,7 @@ The physical values of a table come from `etc_engine.study.quantities`, one row 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, WithJsonSchema, create_model, model_validator
@@ -43,6 +44,12 @@ def _known_solid(found: str | dict[str, Any]) -> str | dict[str, Any]:
         return solid.name if isinstance(found, str) else found
     except InputError as error:
         raise ValueError(str(error)) from None
+
+
+def unknown_method(engine: str, method: str, allowed: Iterable[str]) -> str:
+    """What is wrong with a method, in words."""
+    cure = f"; write engine = {method!r}" if method in ENGINES else ""
+    return f"method: found {method!r}, allowed with {engine}: {', '.join(allowed)}{cure}"
 
 
 def with_options(cls: type[T]) -> type[T]:
@@ -209,7 +216,7 @@ class ConductionTable(QuantityTable):
         allowed = ENGINES[self.engine].methods
         for method in (self.method,) if isinstance(self.method, str) else self.method or ():
             if method not in allowed:
-                raise ValueError(f"method: found {method!r}, allowed with {self.engine}: {', '.join(allowed)}")
+                raise ValueError(unknown_method(self.engine, method, allowed))
         return self
 
 

@@ -33,7 +33,7 @@ from etc_engine.study.schema import (
     Times,
     Word,
 )
-from etc_engine.study.tables import ContactsTable, Engine, PackingTable
+from etc_engine.study.tables import ContactsTable, Engine, PackingTable, unknown_method
 from etc_engine.study.walls import A_VALUE, Value, Wall
 
 SOME = Field(min_length=1)
@@ -92,7 +92,7 @@ class Conduction(StudyTable):
             raise ValueError(f"engine: found {self.engine!r}, a transient takes {' or '.join(TRANSIENT)}")
         allowed = TRANSIENT[self.engine]
         if self.method and self.method not in allowed:
-            raise ValueError(f"method: found {self.method!r}, allowed with {self.engine}: {', '.join(allowed)}")
+            raise ValueError(unknown_method(self.engine, self.method, allowed))
         if self.dipoles and not any("dipoles" in ENGINES[self.engine].methods[word].options for word in self.words):
             raise ValueError(f"dipoles have no meaning with engine = {self.engine!r}: a particle has one temperature")
         return self

@@ -80,6 +80,8 @@ def test_without_density_the_packer_decides():
             ("conduction.angle_curve", "found 'some'", "reduced or full"),
         ),
         ("[statistics]", "[conduction]\nmethod = 5\n[statistics]", ("conduction.method", "found 5")),
+        ("[statistics]", "[conduction]\nmethod = 'pipe'\n[statistics]", ("found 'pipe'", "write engine = 'pipe'")),
+        ("[statistics]", "[conduction]\nengine = ['dtem']\n[statistics]", ("conduction.engine: found ['dtem']",)),
         (
             "[statistics]",
             '[conduction]\npipe_resistance = "chord"\n[statistics]',
