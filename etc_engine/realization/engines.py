@@ -93,9 +93,9 @@ ENGINES: Mapping[str, Engine] = {
                     gas=True,
                 ),
                 "cell": Method(
-                    "Laguerre cells: disks or spheres and the fluid between them",
+                    "Laguerre cells: disks or spheres and the fluid between them (insulating pores of disks: chord)",
                     (2, 3),
-                    pores=MUST,
+                    pores=MAY,
                     transient=True,
                     options=("degree", "frame", "error_estimate", "bounds"),
                 ),

@@ -1,4 +1,4 @@
-"""Do density and contact angle act apart? ``python analyse.py out.nc [collapse.png]``
+"""How do density, contact angle and pores act together? ``python analyse.py out.nc [collapse.png]``
 
 Reads the result of study.toml (or full.toml) with xarray alone; copy it for your own sweeps.
 """
@@ -12,27 +12,53 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 
+def maxwell(solid: xr.DataArray, pores: float, fraction: xr.DataArray) -> xr.DataArray:
+    """Maxwell's formula for disks in a fluid."""
+    beta = (solid - pores) / (solid + pores)
+    return pores * (1.0 + fraction * beta) / (1.0 - fraction * beta)
+
+
 def main(result: str = "out.nc", picture: str = "collapse.png") -> None:
     data = xr.open_dataset(result)
+    if "pore_conductivity" not in data["conductivity"].dims:
+        data = data.expand_dims(pore_conductivity=[0.0])
     k = data["conductivity"]
     k = 0.5 * (k.sel(direction_i="x", direction_j="x") + k.sel(direction_i="y", direction_j="y"))
-    mean, sem = k.mean("realization"), k.std("realization", ddof=1) / np.sqrt(data["count"])
+    mean = k.mean("realization")
+    network = mean.sel(pore_conductivity=0.0)
+    count = k.sel(pore_conductivity=0.0).notnull().sum("realization")
 
     # The same packing serves all angles: the ratio to the contact mean field has little noise in the angle.
-    ratio = mean / data["mean_field_conductivity"].where(k.notnull()).mean("realization")
+    field = data["mean_field_conductivity"]
+    field = field.sel(pore_conductivity=0.0) if "pore_conductivity" in field.dims else field
+    ratio = network / field.where(k.sel(pore_conductivity=0.0).notnull()).mean("realization")
     spread = (ratio.max("contact_angle") - ratio.min("contact_angle")) / ratio.mean("contact_angle")
 
+    print("pores that insulate:")
     print(f"{'density':>8s}{'n':>5s}{'ratio to the mean field':>26s}{'spread over the angles':>25s}")
     for density in data["density"].values:
         cell = ratio.sel(density=density)
-        n = int(data["count"].sel(density=density).min())
+        n = int(count.sel(density=density).min())
         print(f"{density:8.3f}{n:5d}{float(cell.mean()):26.4f}{100 * float(spread.sel(density=density)):23.2f} %")
 
+    fraction = data["solid_fraction"].mean("realization")
+    for pores in data["pore_conductivity"].values[1:]:
+        together = network + maxwell(xr.ones_like(network), float(pores), fraction)
+        error = 100.0 * (together / mean.sel(pore_conductivity=pores) - 1.0)
+        print(f"pores of {pores:g}: contact network alone + Maxwell's pores, against the simulation [%]")
+        for density in data["density"].values:
+            row = "".join(f"{float(v):10.1f}" for v in error.sel(density=density).transpose("contact_angle").values)
+            print(f"{density:8.3f}{row}")
+
+    sem = k.std("realization", ddof=1) / np.sqrt(k.notnull().sum("realization"))
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     for i, angle in enumerate(data["contact_angle"].values):
-        cell, error = mean.sel(contact_angle=angle), sem.sel(contact_angle=angle)
-        left.errorbar(data["density"], cell, error, marker="osD^v<>P"[i % 8], capsize=2, label=f"{angle:g}°")
+        for j, pores in enumerate(data["pore_conductivity"].values):
+            cell = mean.sel(contact_angle=angle, pore_conductivity=pores)
+            error = sem.sel(contact_angle=angle, pore_conductivity=pores)
+            style = {"marker": "osD^v<>P"[i % 8], "color": f"C{i}", "linestyle": ("-", "--", ":", "-.")[j % 4]}
+            left.errorbar(data["density"], cell, error, capsize=2, label=f"{angle:g}°, {pores:g}", **style)
         right.plot(data["density"], ratio.sel(contact_angle=angle), marker="osD^v<>P"[i % 8], label=f"{angle:g}°")
     left.set_ylabel("conductivity [W m$^{-1}$ K$^{-1}$]")
     right.set_ylabel("conductivity over contact mean field [-]")
@@ -40,7 +66,7 @@ def main(result: str = "out.nc", picture: str = "collapse.png") -> None:
         axes.set_xlabel("density [-]")
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
-    left.legend(title="contact half-angle", frameon=False)
+    left.legend(title="half-angle, pores", frameon=False, fontsize=8)
     figure.savefig(picture, dpi=130)
 
 

@@ -18,8 +18,8 @@ SMALL = {
     "density_angle": (
         {
             r"density = \[.*?\]": "density = [0.6, 0.65, 0.7]",
-            "0.01:0.02": "0.03:0.05",
-            "realizations = 20": "realizations = 4",
+            "0.015:0.03": "0.03:0.05",
+            "realizations = 8": "realizations = 4",
         },
         r"0\.700    4 +0\.\d{4} +\d\.\d\d %",
     ),
@@ -88,7 +88,7 @@ def test_analyses_import_nothing_of_the_engine():
 
 def test_the_tutorial_draws_a_figure(made_sweep, tmp_path):
     text = re.sub(r"density = \[.*?\]", "density = [0.6, 0.7]", (STUDIES / "density_angle" / "study.toml").read_text())
-    write_dataset(made_sweep(text, lambda f, a, _, r: (f - 0.5) * (a + r)), tmp_path / "out.nc")
+    write_dataset(made_sweep(text, lambda f, a, _, r: (f - 0.5) * (a["contact_angle"] + r)), tmp_path / "out.nc")
     block = re.search(r"<!-- own figure -->\n```python\n(.*?)```", (STUDIES / "README.md").read_text(), re.S)
     line = [sys.executable, "-W", "error", "-c", block[1]]
     environment = {**os.environ, "MPLBACKEND": "Agg"}

@@ -17,11 +17,11 @@ name = "warming"
 [packing]
 files = "{TABLE_2}"
 box = [1.0, 1.0]
-[walls]
-left = {{ type = "fixed", value = 1.0 }}
 [particles]
 heat_capacity = 1.0
 initial = 0.0
+[walls]
+left = {{ type = "fixed", value = 1.0 }}
 [time]
 scheme = "bdf2"
 times = [0.0, 0.1]

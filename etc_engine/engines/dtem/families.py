@@ -35,6 +35,8 @@ class Family:
         (method, result) -> what a user should know about the accuracy of a result.
     system : callable, optional
         (medium, walls, method=, source=, capacities=, options) -> ParticleSystem.
+    limit : str, optional
+        Method of `CONTACTS` that takes over where the pores insulate.
     foreign : mapping
         Options of the method that belong to the other dimension, with the values that say nothing.
     """
@@ -44,6 +46,7 @@ class Family:
     remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
     system: Callable[..., ParticleSystem] | None = None
     foreign: Mapping[str, Any] = field(default_factory=dict)
+    limit: str | None = None
 
 
 CONTACTS = Family(
@@ -56,7 +59,12 @@ CONTACTS = Family(
 
 FAMILIES: Mapping[tuple[str, int], Family] = {
     ("cell", 2): Family(
-        disk_cells.solve_series, disk_cells.disk_field, disk_cells.accuracy_remarks, cell_system, {"frame": None}
+        disk_cells.solve_series,
+        disk_cells.disk_field,
+        disk_cells.accuracy_remarks,
+        cell_system,
+        {"frame": None},
+        "chord",
     ),
     ("cell", 3): Family(
         sphere_cells.solve_series,
@@ -75,9 +83,20 @@ FAMILIES: Mapping[tuple[str, int], Family] = {
 """Families by method and dimension; every other method is one of `CONTACTS`."""
 
 
-def family_of(method: str, dimension: int) -> Family:
-    """The family of a method."""
-    return FAMILIES.get((method, dimension), CONTACTS)
+def family_of(method: str, medium: Medium) -> tuple[Family, str]:
+    """The family that solves a medium by a method, and the method it uses.
+
+    Raises
+    ------
+    InputError
+        If the pores insulate, and the method has no limit of its own for that.
+    """
+    family = FAMILIES.get((method, medium.dimension), CONTACTS)
+    if family is CONTACTS or medium.pores.conduct:
+        return family, method
+    if family.limit is None:
+        raise InputError(f"method {method} is only valid with pores that conduct in {medium.dimension}D")
+    return CONTACTS, family.limit
 
 
 def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
@@ -86,29 +105,42 @@ def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result
     Raises
     ------
     InputError
-        If an option belongs to the other dimension.
+        If an option belongs to the other dimension, or the pores must conduct and do not.
     """
-    dimension = media[0].dimension
-    family = family_of(conduction.method, dimension)
+    found: dict[int, Result] = {}
+    for conduct in (True, False):
+        rows = [row for row, medium in enumerate(media) if medium.pores.conduct == conduct]
+        if rows:
+            some = [media[row] for row in rows]
+            found |= dict(zip(rows, _solve_alike(some, conduction), strict=True))
+    return [found[row] for row in range(len(media))]
+
+
+def _solve_alike(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
+    """Results of media whose pores all conduct, or all insulate."""
+    family, method = family_of(conduction.method, media[0])
+    if method != conduction.method:
+        return family.solve(media, replace(conduction, method=method, options={}))
     for name, neutral in family.foreign.items():
         if conduction.options.get(name, neutral) != neutral:
-            raise InputError(f"option {name} means nothing to method {conduction.method} in {dimension}D: leave it out")
+            raise InputError(f"option {name} means nothing to method {method} in {media[0].dimension}D: leave it out")
     own = {name: value for name, value in conduction.options.items() if name not in family.foreign}
     return family.solve(media, replace(conduction, options=own))
 
 
 def field_of(medium: Medium, method: str, solution: Any, load: int) -> ParticleField:
     """Temperatures and heat flows of one load of a solution."""
-    return family_of(method, medium.dimension).recover(medium, solution, load)
+    return family_of(method, medium)[0].recover(medium, solution, load)
 
 
 def system_of(medium: Medium, walls: Mapping[str, Any], *, method: str, **options: Any) -> ParticleSystem:
     """A medium ready to be marched in time, by a method with a transient form."""
-    system = family_of(method, medium.dimension).system
-    assert system is not None, method
-    return system(medium, walls, method=method, **options)
+    family, method = family_of(method, medium)
+    assert family.system is not None, method
+    return family.system(medium, walls, method=method, **options)
 
 
 def remarks_on(method: str, result: EffectiveConductivity[Any]) -> tuple[str, ...]:
     """What a user should know about the accuracy of a result."""
-    return family_of(method, result.tensor.shape[0]).remarks(method, result)
+    family = FAMILIES.get((method, result.tensor.shape[0]), CONTACTS)
+    return family.remarks(method, result)

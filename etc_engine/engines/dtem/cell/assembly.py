@@ -67,20 +67,41 @@ class CellSystem:
 
 
 def assemble_cells(
-    cells: LaguerreCells, edges: CellEdges, grid: EdgeGrid, frame: Frame, materials: CellMaterials
+    cells: LaguerreCells,
+    edges: CellEdges,
+    grid: EdgeGrid,
+    frame: Frame,
+    materials: CellMaterials,
+    *,
+    only: Ints | None = None,
+    base: CellSystem | None = None,
 ) -> CellSystem:
-    """Reduce every cell to its frame and add it to the sparse matrix.
+    """Reduce cells to their frames and add them to the sparse matrix.
+
+    Parameters
+    ----------
+    cells, edges, grid, frame, materials
+    only : ndarray of int64, optional
+        Rows of the cells that are added; all by default.
+    base : CellSystem, optional
+        System of the same frame to which they are added, itself left as it is.
 
     Notes
     -----
     Cells are added in their order, so that two assemblies agree bit for bit.
     """
-    indptr, indices = _pattern(frame, cells.starts.size - 1)
-    data = np.zeros(indices.size)
-    loads, energy = np.zeros((frame.count, 2)), np.zeros((2, 2))
+    if base is None:
+        indptr, indices = _pattern(frame, cells.starts.size - 1)
+        data = np.zeros(indices.size)
+        loads, energy = np.zeros((frame.count, 2)), np.zeros((2, 2))
+    else:
+        indptr, indices, data = base.matrix.indptr, base.matrix.indices, base.matrix.data.copy()
+        loads, energy = base.loads.copy(), base.gradient_energy.copy()
+    rows = np.arange(cells.starts.size - 1) if only is None else only
     nodes = rim_nodes(cells, grid)
     work = workspace(int(nodes.max()), int(np.diff(cells.starts).max()), int(np.diff(frame.starts).max()))
     _assemble(
+        rows,
         (cells.starts, cells.edges, cells.forward),
         edges,
         grid,
@@ -111,11 +132,11 @@ def _pattern(frame: Frame, count: int) -> tuple[NDArray[np.int32], NDArray[np.in
 
 
 @njit(cache=True)
-def _assemble(cells, edges, grid, frame, materials, work, system):  # type: ignore[no-untyped-def]
+def _assemble(rows, cells, edges, grid, frame, materials, work, system):  # type: ignore[no-untyped-def]
     starts, unknowns, positions, degrees, storing = frame
     indptr, indices, data, loads, energy = system
     matrix = work[2]
-    for i in range(cells[0].size - 1):
+    for i in rows:
         _, inner, size = reduce_cell(i, cells, edges, grid, degrees, storing, materials, work)
         mine = unknowns[starts[i] : starts[i + 1]]
         places = positions[starts[i] : starts[i + 1]]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution
 from etc_engine.engines.dtem.cell.rim_grid import BONDED
-from etc_engine.engines.dtem.cell.steady import CellModel, CellSolution, build_model, solve_model
+from etc_engine.engines.dtem.cell.steady import CellModel, CellSolution, build_model, common_part, solve_model
 from etc_engine.errors import InputError
 from etc_engine.medium.conductivity import check_balance, conductivities
 from etc_engine.medium.loads import asked_groups
@@ -149,13 +149,15 @@ def _direct(
     asked = (0, 1) if axes is None else axes
     needed = asked if not dual else ((0, 1) if all(box.periodic) else tuple(sorted(1 - axis for axis in asked)))
     tensor = np.full((2, 2), np.nan)
+    groups = asked_groups(box, needed)
+    driven = [geometry.driven_by(group) for group in groups]
+    shared = common_part(geometry, solid, fluid, resolution) if len({id(cells) for cells in driven}) > 1 else None
     models: dict[int, CellModel] = {}
     solutions = []
-    for group in asked_groups(box, needed):
-        driven = geometry.driven_by(group)
-        key = id(driven)
+    for group, cells in zip(groups, driven, strict=True):
+        key = id(cells)
         if key not in models:
-            models = {key: build_model(driven, solid, fluid, resolution)}
+            models = {key: build_model(cells, solid, fluid, resolution, like=shared)}
         solution = solve_model(models[key], group, tolerance=tolerance)
         if not box.periodic[group[0]]:
             check_balance(*solution.wall_heat(), float(solution.energies[0, 0]))

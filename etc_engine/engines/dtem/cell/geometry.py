@@ -44,6 +44,11 @@ class CellGeometry:
         """Number of disks."""
         return int(self.radii.size)
 
+    @property
+    def wall_disks(self) -> NDArray[np.int64]:
+        """Rows of the disks whose cells reach a wall."""
+        return np.unique(self.cells.cells[self.cells.at_wall, 0])
+
     def driven_by(self, axes: tuple[int, ...]) -> CellGeometry:
         """The cells under a load, which drives the walls of walled axes only."""
         return self.with_walls(np.repeat([axis in axes and not self.box.periodic[axis] for axis in range(2)], 2))

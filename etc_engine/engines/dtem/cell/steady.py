@@ -85,6 +85,7 @@ def build_model(
     resolution: Resolution | None = None,
     *,
     storing: bool = False,
+    like: CellModel | None = None,
 ) -> CellModel:
     """Reduce and assemble the cells for one set of conductivities.
 
@@ -96,6 +97,8 @@ def build_model(
     resolution : Resolution, optional
     storing : bool
         Whether the mean temperatures of the disks are unknowns too.
+    like : CellModel, optional
+        Of `common_part`: cells away from walls that have been assembled with the same conductivities.
 
     Returns
     -------
@@ -104,7 +107,17 @@ def build_model(
     resolution = resolution or Resolution()
     grid, frame = divide(geometry, solid, fluid, resolution, storing=storing)
     materials = CellMaterials(geometry.radii, np.ascontiguousarray(solid, np.float64), float(fluid))
-    system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials)
+    only, base = (None, None) if like is None else (geometry.wall_disks, like.system)
+    system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials, only=only, base=base)
+    return CellModel(geometry, materials, grid, frame, system)
+
+
+def common_part(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution | None = None) -> CellModel:
+    """What models of one packing share whose contacts differ at walls only: all cells away from the walls."""
+    grid, frame = divide(geometry, solid, fluid, resolution or Resolution())
+    materials = CellMaterials(geometry.radii, np.ascontiguousarray(solid, np.float64), float(fluid))
+    inner = np.setdiff1d(np.arange(geometry.count), geometry.wall_disks)
+    system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials, only=inner)
     return CellModel(geometry, materials, grid, frame, system)
 
 
