@@ -97,7 +97,7 @@ def test_exact_reaches_the_converged_truth_with_three_modes(network):
 
 def test_disks_cut_by_the_driven_walls_alone(network):
     """0.2787795, of an independent prototype."""
-    uncut = replace(network, geometric=False)
+    uncut = replace(network, rule="bonded")
     assert effective_conductivity(medium_of(uncut), method="exact", axes=(0,)).tensor[0, 0] == pytest.approx(
         0.2787795, abs=2e-7
     )

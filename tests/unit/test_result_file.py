@@ -95,4 +95,4 @@ def test_a_failing_machine_leaves_no_result(error, monkeypatch):
         raise error
 
     with pytest.raises(OutputError, match="continue with --resume"):
-        run_unit(SimpleNamespace(seed=5), None, Unit(0.7, 3), 0, fail)
+        run_unit(SimpleNamespace(seed=5, for_realization=lambda spec, _: spec), None, Unit(0.7, 3), 0, fail)
