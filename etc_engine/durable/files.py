@@ -53,7 +53,7 @@ def replacing(path: Path | str, *, keep: bool = True) -> Iterator[Path]:
         if place.exists():
             temporary.chmod(place.stat().st_mode & 0o7777)
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+        raise _refusal(path, error) from None
     try:
         yield temporary
         if not keep:
@@ -62,7 +62,7 @@ def replacing(path: Path | str, *, keep: bool = True) -> Iterator[Path]:
         temporary.replace(place)
         sync_folder(place.parent)
     except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+        raise _refusal(path, error) from None
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -81,6 +81,13 @@ def write_atomically(path: Path, data: bytes) -> None:
 def sync_folder(folder: Path) -> None:
     """Make renames and new files in a folder survive a crash of the machine."""
     _sync(folder)
+
+
+def _refusal(path: Path, error: OSError) -> OutputError:
+    """The error in words; its ``errno`` stays, so that a caller can tell a full disk."""
+    refusal = OutputError(f"cannot write {path}: {error.strerror or error}")
+    refusal.errno = error.errno
+    return refusal
 
 
 def _sync(path: Path) -> None:

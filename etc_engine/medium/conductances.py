@@ -42,6 +42,7 @@ def contact_conductances(medium: Medium, law: str = "chord") -> tuple[Floats, Fl
 
     Examples
     --------
+    >>> import numpy as np
     >>> from etc_engine.box import Box
     >>> from etc_engine.medium.rules import bonded_contacts
     >>> from etc_engine.packing.particles import ParticlePacking

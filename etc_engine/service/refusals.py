@@ -123,7 +123,9 @@ def _problem(status: int, error: str, field: str = "") -> JSONResponse:
     return JSONResponse({"error": " ".join(error.split()), "field": field}, status)
 
 
-def _refuse_input(_request: Request, error: Exception) -> Response:
+def _refuse_input(request: Request, error: Exception) -> Response:
+    if _disk_is_full(error):
+        return _report_failure(request, error)
     if isinstance(error, EngineError):
         log.error("%s", error)
         return _problem(500, str(error))
@@ -160,9 +162,12 @@ def _refuse_parameter(_request: Request, error: Exception) -> Response:
     return _problem(422, f"{field or 'body'}: {first['msg']}", field)
 
 
+def _disk_is_full(error: Exception) -> bool:
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 def _report_failure(_request: Request, error: Exception) -> Response:
-    full = isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
-    if full or (isinstance(error, sqlite3.Error) and "full" in str(error)):
+    if _disk_is_full(error) or (isinstance(error, sqlite3.Error) and "full" in str(error)):
         return _problem(507, "the disk of the service is full: nothing was changed, try again when there is room")
     log.error("unexpected %s: %s", type(error).__name__, error, exc_info=error)
     return _problem(500, f"unexpected {type(error).__name__} in the service, see its log")

@@ -96,6 +96,8 @@ def open_store(root: Path) -> Iterator[Store]:
         _check_kind(root)
         root.mkdir(parents=True, exist_ok=True)
         handle = os.open(root / "lock", os.O_RDWR | os.O_CREAT, 0o600)
+    except OutputError:
+        raise
     except OSError as error:
         raise OutputError(f"data directory {root}: cannot be written ({error.strerror})") from None
     try:
@@ -104,7 +106,7 @@ def open_store(root: Path) -> Iterator[Store]:
         try:
             _prepare(store)
         except OSError as error:
-            raise OutputError(f"data directory {root}: cannot be written ({error.strerror})") from None
+            raise OutputError(f"data directory {root}: cannot be written ({error.strerror or error})") from None
         yield store
     finally:
         os.close(handle)
