@@ -32,12 +32,15 @@ SPHERES = {
     "time": {"scheme": "bdf2", "steps": 20, "times": [0.0, 0.1, 1.0, 8.0]},
 }
 
+ROUGH = {"height": 1e-6, "slope": 0.1, "hardness": 4e9}
+HERTZ = {"rule": "hertz", "youngs_modulus": 6e10, "poisson_ratio": 0.25}
+
 
 def study_of(**changes):
     content = copy.deepcopy(SPHERES)
     for place, value in changes.items():
-        table, key = place.split("__")
-        content.setdefault(table, {})[key] = value
+        table, _, key = place.partition("__")
+        content[table] = {**content.get(table, {}), key: value} if key else value
     return parse_study(content)
 
 
@@ -67,6 +70,11 @@ def test_without_pores_the_method_is_that_of_the_contacts():
         ({"pores__conductivity": -1.0}, "pores.conductivity"),
         ({"pores__conductivity": 0.0}, "only if they conduct"),
         ({"pores__conductivity": 0.0, "pores__heat_capacity": 0.0, "conduction__method": "facets"}, "do not conduct"),
+        ({"contacts__contact_angle": 5.0}, r"contacts\.contact_angle: has no meaning with rule = 'overlap'"),
+        ({"contacts__load": 1e5}, r"contacts\.load: has no meaning with rule = 'overlap'"),
+        ({"contacts": {"rule": "bonded", "contact_angle": 5.0, "coordination": 4.0}}, "coordination: has no meaning"),
+        ({"contacts": {**HERTZ, "roughness": ROUGH}}, r"contacts\.roughness: a transient does not compute"),
+        ({"contacts": {**HERTZ, "youngs_modulus": [1e9, 2e9]}}, r"youngs_modulus: a transient takes one value"),
     ],
 )
 def test_what_does_not_fit_is_refused(changes, words):
