@@ -48,6 +48,12 @@ def test_softened_run_and_load(bed, capfd):
     assert more["conductivity"] / load["conductivity"] == pytest.approx(2.0, rel=0.01)  # c ~ F^(1/3)
 
 
+def test_the_closest_pairs_give_the_coordination_number(bed, capfd):
+    """Three contacts of 27 spheres each way: 81 make a coordination number of 6."""
+    closest = solved(capfd, *bed, "--rule", "coordination", "--contact-angle", "5", "--coordination", "6")
+    assert (closest["contact_rule"], closest["contacts"], closest["coordination"]) == ("coordination", 81, 6.0)
+
+
 def test_rough_contacts_conduct_less(bed, capfd):
     smooth = solved(capfd, *bed, "--load", "1e6", *ELASTIC)
     rough = solved(capfd, *bed, "--load", "1e6", *ELASTIC, "--roughness", "1e-6,0.1,4e9")
@@ -68,6 +74,9 @@ def test_a_material_at_its_temperature(bed, capfd):
         (["--rule", "overlap", "--youngs-modulus", "1e9"], "means nothing to the contact rule overlap"),
         (["--rule", "hertz", "--simulated-modulus", "1e8"], "also needs --youngs-modulus"),
         (["--load", "1e6", "--youngs-modulus", "90e9"], "also needs --poisson-ratio"),
+        (["--rule", "coordination", "--contact-angle", "5"], "also needs --coordination"),
+        (["--rule", "coordination", "--coordination", "6"], "also needs --contact-angle"),
+        (["--rule", "hertz", "--coordination", "6"], "--coordination means nothing to the contact rule hertz"),
         (["--roughness", "1e-6"], "takes height, slope and hardness"),
         (["--gas", "helium", "--pressure", "1e5"], "needs a temperature"),
         (["--gas", "helium", "--pressure", "1e5", "--temperature", "300", "--pore-conductivity", "1"], "leave one"),
