@@ -124,9 +124,9 @@ class Gradient(StudyTable):
 
 
 class Source(StudyTable):
-    """One of ``[[source]]``: heat released in each of some particles (all by default) [W/m]."""
+    """One of ``[[source]]``: heat released in each of some particles (all by default)."""
 
-    heat: Value = Field(description=f"{A_VALUE} [W/m]")
+    heat: Value = Field(description=f"{A_VALUE} [W, of disks W/m]")
     particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
         default=None, description="a list of whole numbers from 0, the rows of particles; all by default"
     )
