@@ -194,8 +194,10 @@ class _Asked:
 
     def gap(self, network: ContactNetwork) -> float:
         """Largest gap of a contact in mean radii: the user's, that of the closest pairs, or 0."""
+        from etc_engine.medium.sample_warnings import widest_gap
+
         if self.closest:
-            return _widest_gap(network)
+            return widest_gap(network)
         return self.bond_gap if self.takes_gap else 0.0
 
     def medium(self, table: ParticleTable, particles: Path, dumped: ContactNetwork | None) -> Medium:
@@ -343,18 +345,6 @@ def _trimmed(medium: Medium, table: ParticleTable, axes: tuple[int, ...]) -> Med
         text = f"the crop goes through {cut} contacts between particles, which are left out"
         click.echo(f"etc-engine: warning: {text}", err=True)
     return medium.with_network(network)
-
-
-def _widest_gap(network: ContactNetwork) -> float:
-    """Largest gap between two particles in contact, over the mean of their radii; 0 without one."""
-    import numpy as np
-
-    packing = network.packing
-    i, j = network.pairs.T
-    apart = packing.centers[j] - packing.centers[i] + network.shifts * np.asarray(packing.box.lengths)
-    reach = packing.radii[i] + packing.radii[j]
-    gaps = (np.linalg.norm(apart, axis=1) - reach) / (0.5 * reach)
-    return float(gaps.max(initial=0.0))
 
 
 def _warn_of_missing_contacts(network: ContactNetwork, asked: _Asked, *, given: bool) -> None:

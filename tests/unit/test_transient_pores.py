@@ -56,6 +56,22 @@ def test_spheres_in_a_gas_end_at_the_steady_state(tmp_path):
     np.testing.assert_allclose(late, steady, atol=1e-4)
 
 
+@pytest.mark.parametrize("rule", ["overlap", "hertz"])
+def test_a_transient_packs_for_a_contact_rule_as_a_sweep_does(rule, tmp_path):
+    """Both rules take contacts from overlaps, so radii grow to the density, which touching disks cannot reach."""
+    packing = {"method": "advancing-front", "radii": "equal:0.1", "density": 0.9, "box": [1.0, 1.0]}
+    disks = study_of(
+        packing=packing,
+        contacts={"rule": rule},
+        pores={},
+        conduction={"engine": "pipe"},
+        walls={"left": {"type": "fixed", "value": 1.0}},
+        time={"scheme": "bdf2", "steps": 1, "times": [0.0, 0.1]},
+    )
+    found = run_transient(disks, tmp_path).network.packing
+    assert found.density == pytest.approx(0.9, abs=1e-9)
+
+
 def test_without_pores_the_method_is_that_of_the_contacts():
     study = study_of(pores__conductivity=0.0, pores__heat_capacity=0.0)
     assert study.conduction.method_for(3, False) == "chord"
