@@ -194,7 +194,7 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
         )
     bound = "whole cells" if comparison.attrs["pores_conduct"] else "overlapping particles"
     if not comparison.attrs["bounds_bind"]:
-        click.echo("bounds: a comparison only; Hashin-Shtrikman bounds bind overlapping geometries, not bonded ones")
+        click.echo(f"bounds: a comparison only, they do not bind: {comparison.attrs['bounds_unbound']}")
     elif comparison.attrs["bound_broken"]:
         click.echo(f"bounds: they bind {bound}, and are broken")
     else:

@@ -3,15 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-FORMATS = ("csv", "moose", "comsol", "openfoam")
+
+class _Format(click.ParamType):
+    """A row of the exports, which are imported when one is asked for."""
+
+    name = "format"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The word, if there is such a row."""
+        from etc_engine.output.exports import EXPORTS
+
+        if value not in EXPORTS:
+            self.fail(f"{value!r} is not one of {', '.join(EXPORTS)}", param, ctx)
+        return str(value)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:  # noqa: ARG002 - of the base class
+        """The words, for the help."""
+        from etc_engine.output.exports import EXPORTS
+
+        return f"[{'|'.join(EXPORTS)}]"
 
 
 @click.command("export")
 @click.argument("result", type=click.Path(path_type=Path))
-@click.option("--to", "form", type=click.Choice(FORMATS), required=True, help="Format of the file.")
+@click.option("--to", "form", type=_Format(), required=True, help="Format of the file.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write; standard output if left out.")
 @click.option("--at", "fixed", multiple=True, metavar="NAME=VALUE", help="Keep one value of a dimension of the sweep.")
 def export_command(result: Path, form: str, output: Path | None, fixed: tuple[str, ...]) -> None:

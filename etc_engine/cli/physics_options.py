@@ -17,9 +17,15 @@ if TYPE_CHECKING:
 
 OPTIONS = (
     click.option(
-        "--rule", help="Contact rule: overlap, bonded, radius, hertz or load; by default what the options fit."
+        "--rule",
+        help="Contact rule: overlap, bonded, radius, coordination, hertz or load; by default what the options fit.",
     ),
     click.option("--contact-radius", type=float, help="Radius of bonded contacts [m], instead of --contact-angle."),
+    click.option(
+        "--coordination",
+        type=float,
+        help="With --rule coordination or load: mean coordination number; the closest pairs touch, as many as give it.",
+    ),
     click.option("--youngs-modulus", type=float, help="Young's modulus of the particles [Pa]."),
     click.option("--poisson-ratio", type=float, help="Poisson's ratio of the particles."),
     click.option(
@@ -40,24 +46,13 @@ OPTIONS = (
 )
 
 
-NEEDED: dict[str, tuple[str, ...]] = {
-    "overlap": (),
-    "bonded": ("contact_angle",),
-    "radius": ("contact_radius",),
-    "coordination": ("contact_angle", "coordination"),
-    "hertz": (),
-    "softened": ("youngs_modulus", "poisson_ratio"),
-    "load": ("load", "youngs_modulus", "poisson_ratio"),
-}
-"""What every contact rule of the command needs."""
-
-
 @dataclass(frozen=True)
 class PhysicsWords:
     """What the options say of contacts, solid and pores."""
 
     rule: str | None = None
     contact_radius: float | None = None
+    coordination: float | None = None
     youngs_modulus: float | None = None
     poisson_ratio: float | None = None
     simulated_modulus: float | None = None
@@ -143,6 +138,10 @@ class PhysicsWords:
             return self.rule
         return "radius" if self.contact_radius is not None else "load" if self.load is not None else None
 
+    def rule_for(self, half_angle: float | None) -> str:
+        """The rule asked for, by default bonds where they have a half-angle and overlaps where they have none."""
+        return self.contact_rule or ("overlap" if half_angle is None else "bonded")
+
     def network(self, packing: ParticlePacking, half_angle: float | None, bond_gap: float) -> ContactNetwork:
         """Contacts by the rule asked for.
 
@@ -154,11 +153,12 @@ class PhysicsWords:
         from etc_engine.errors import InputError
         from etc_engine.medium.rules import find_rule
 
-        word = self.contact_rule or ("overlap" if half_angle is None else "bonded")
+        word = self.rule_for(half_angle)
         rule = find_rule(word)
         values = {
             "contact_angle": half_angle,
             "contact_radius": self.contact_radius,
+            "coordination": self.coordination,
             "youngs_modulus": self.youngs_modulus,
             "poisson_ratio": self.poisson_ratio,
             "simulated_modulus": self.simulated_modulus,
@@ -169,12 +169,12 @@ class PhysicsWords:
         for name in given:
             if name not in used:
                 raise InputError(f"{_option(name)} means nothing to the contact rule {word}")
-        softened = word == "hertz" and self.simulated_modulus is not None
-        for name in NEEDED["softened" if softened else word]:
-            if name not in given:
-                raise InputError(f"the contact rule {word} also needs {_option(name)}")
         if "bond_gap" in rule.keys:
             given["bond_gap"] = bond_gap
+        elastic = ("youngs_modulus", "poisson_ratio") if self.simulated_modulus is not None else ()
+        for name in (*rule.needs, *elastic):
+            if name not in given:
+                raise InputError(f"the contact rule {word} also needs {_option(name)}")
         return rule.contacts(packing, **{rule.keys[name]: value for name, value in given.items() if name in rule.keys})
 
     def roughened(self, network: ContactNetwork, conductivity: Any, pores: Pores) -> ContactNetwork:

@@ -41,8 +41,8 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
 @click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
 @click.option(
     "--method",
-    help="Of dtem: chord, standard, enhanced, arc, exact; where the pores conduct cell (disks) or facets (spheres); "
-    "of pipe: chord or uniform.",
+    help="Of dtem: chord, standard, enhanced, arc, exact, cell (disks or spheres) or facets (spheres, where the pores "
+    "conduct); of pipe: chord or uniform, for spheres also holm or root-area. By default the first that fits.",
 )
 @click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
@@ -119,10 +119,10 @@ def solve_command(
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
     if not medium.pores.conduct:
-        _warn_of_missing_contacts(medium.links, asked.bonded, asked.bond_gap)
-    gap = asked.bond_gap if asked.bonded else 0.0
-    if dumped.contacts is None:
-        warn(digit_warnings(table, gap, bonded=asked.bonded))
+        _warn_of_missing_contacts(medium.links, asked, given=dumped.contacts is not None)
+    gap = asked.gap(medium.links)
+    if dumped.contacts is None and not asked.closest:  # of the closest pairs there are as many, whatever the digits
+        warn(digit_warnings(table, gap, bonded=asked.takes_gap))
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
     warn(box_warnings(table, driven, gap))
     warn(excess_warnings(result.tensor, np.append(medium.conductivity, medium.pores.conductivity)))
@@ -161,8 +161,12 @@ class _Asked:
         if self.method == "pipe" or self.pipe_resistance is not None:
             found = "--method pipe" if self.method == "pipe" else f"--pipe-resistance {self.pipe_resistance}"
             raise InputError(f"{found} is now --engine pipe --method {self.pipe_resistance or 'chord'}")
-        if not self.bonded and self.bond_gap != BOND_GAP and self.physics.contact_rule != "load":
-            raise InputError("--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap")
+        if self.bond_gap != BOND_GAP and not self.takes_gap:
+            if self.rule == "overlap":
+                raise InputError(
+                    "--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap"
+                )
+            raise InputError(f"--bond-gap means nothing to the contact rule {self.rule}: leave it out")
         if self.contact_resistance > 0.0 and self.physics.roughness is not None:
             raise InputError("--contact-resistance and --roughness both resist at contacts: leave one of them out")
 
@@ -170,6 +174,31 @@ class _Asked:
     def bonded(self) -> bool:
         """Whether contacts are bonds of a given width."""
         return self.contact_angle is not None or self.physics.contact_radius is not None
+
+    @property
+    def rule(self) -> str:
+        """The word of the contact rule."""
+        return self.physics.rule_for(self.contact_angle)
+
+    @property
+    def takes_gap(self) -> bool:
+        """Whether the contact rule joins particles across a gap that the user gives."""
+        from etc_engine.medium.rules import find_rule
+
+        return "bond_gap" in find_rule(self.rule).keys and not self.closest
+
+    @property
+    def closest(self) -> bool:
+        """Whether the contacts are the closest pairs, as many as give a coordination number."""
+        return self.physics.coordination is not None
+
+    def gap(self, network: ContactNetwork) -> float:
+        """Largest gap of a contact in mean radii: the user's, that of the closest pairs, or 0."""
+        from etc_engine.medium.sample_warnings import widest_gap
+
+        if self.closest:
+            return widest_gap(network)
+        return self.bond_gap if self.takes_gap else 0.0
 
     def medium(self, table: ParticleTable, particles: Path, dumped: ContactNetwork | None) -> Medium:
         """The particles of a file with contacts, those of a contact dump if there is one, and materials."""
@@ -318,8 +347,8 @@ def _trimmed(medium: Medium, table: ParticleTable, axes: tuple[int, ...]) -> Med
     return medium.with_network(network)
 
 
-def _warn_of_missing_contacts(network: ContactNetwork, bonded: bool, bond_gap: float) -> None:
-    """A packing without a single contact is most likely a misunderstanding about the contact rule."""
+def _warn_of_missing_contacts(network: ContactNetwork, asked: _Asked, *, given: bool) -> None:
+    """A packing without a single contact is most likely a misunderstanding about the contact rule, or their file."""
     from etc_engine.packing.neighbors import neighbor_pairs
 
     packing = network.packing
@@ -329,8 +358,15 @@ def _warn_of_missing_contacts(network: ContactNetwork, bonded: bool, bond_gap: f
     if not near.count:
         return
     closest = float((near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))).min())
-    rule = f"no surfaces are within {bond_gap:g} mean radii" if bonded else "no particles overlap"
-    remedy = "see --bond-gap" if bonded else "touching particles conduct with --contact-angle"
+    if given:
+        rule, remedy = "the file of contacts has none between these particles", "see --contacts"
+    elif asked.closest:
+        rule, remedy = f"--coordination {asked.physics.coordination:g} makes no contact", "give a larger one"
+    elif asked.takes_gap:
+        rule, remedy = f"no surfaces are within {asked.bond_gap:g} mean radii", "see --bond-gap"
+    else:
+        instead = "--contact-angle" if asked.rule == "overlap" else f"--rule bonded or load instead of {asked.rule}"
+        rule, remedy = "no particles overlap", f"touching particles conduct with {instead}"
     click.echo(
         f"etc-engine: warning: {rule}, so nothing conducts; the closest pair is {max(closest, 0.0):.2g} mean radii "
         f"apart: {remedy}",

@@ -78,8 +78,8 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         conductivity with its interval (see `etc_engine.comparison.simulation.simulated`), ``inside_bounds``,
         ``realizations_outside_bounds``. Over the densities: ``rms_relative_difference`` and ``best_model``,
         among estimates. Coordinates ``model_kind``, ``model_title`` and ``model_note`` (why a value is
-        missing, or 0). Attributes: ``bounds_bind``, ``bound_broken``, ``best_model``, the phases, and
-        ``model_parameters`` as JSON.
+        missing, or 0). Attributes: ``bounds_bind``, ``bounds_unbound`` (why not), ``bound_broken``, ``best_model``,
+        the phases, and ``model_parameters`` as JSON.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def model_curve(
     Examples
     --------
     >>> from xarray import DataArray
-    >>> medium, fraction = Phases(DataArray(0.0), DataArray(1.0), 2, True), DataArray([0.8, 1.0], dims="density")
+    >>> medium, fraction = Phases(DataArray(0.0), DataArray(1.0), 2, ""), DataArray([0.8, 1.0], dims="density")
     >>> model_curve("maxwell_inverse", medium, fraction)[0].values.round(6)
     array([0.666667, 1.      ])
     >>> model_curve("maxwell", medium, fraction[:1])[1]
@@ -231,7 +231,7 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
         density, fraction = fine, np.interp(fine, density[known], fraction[known])
     attrs = comparison.attrs
     pores, particles = comparison["pore_conductivity"], comparison["particle_conductivity"]
-    medium = Phases(pores, particles, attrs["dimension"], bool(attrs["bounds_bind"]))
+    medium = Phases(pores, particles, attrs["dimension"], str(attrs["bounds_unbound"]))
     parameters = json.loads(attrs["model_parameters"])
     names = [str(name) for name in comparison["model"].values if str(name) != MEAN_FIELD]
     fractions = xarray.DataArray(fraction, coords={"density": density}, dims="density")
@@ -304,7 +304,7 @@ def _add_bounds(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases)
     result["inside_bounds"] = ~outside & (result["realizations_outside_bounds"] == 0)
     result["bound_broken"] = result["outside_bound"] & universal & binding
     broken = binding and not bool(result["inside_bounds"].all())
-    result.attrs |= {"bounds_bind": int(binding), "bound_broken": int(broken)}
+    result.attrs |= {"bounds_bind": int(binding), "bounds_unbound": medium.unbound, "bound_broken": int(broken)}
 
 
 def _doubt(result: xarray.Dataset, dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray | float:

@@ -29,15 +29,20 @@ class Phases:
         Conductivity of phase 1 and of phase 2: a number, or one per value of the dimensions that vary it.
     dimension : int
         2 for disks, 3 for spheres.
-    bounds_bind : bool
-        True if the simulated body is the union of the particles, whose solid fraction is known: then the bounds bind
-        it. A bonded contact is wider than its geometry.
+    unbound : str
+        Why the rigorous bounds do not bind; empty if they do. They bind the union of the particles, whose solid
+        fraction is known.
     """
 
     pores: xarray.DataArray
     particles: xarray.DataArray
     dimension: int
-    bounds_bind: bool
+    unbound: str
+
+    @property
+    def bounds_bind(self) -> bool:
+        """Whether the rigorous bounds bind the simulated body."""
+        return not self.unbound
 
     @property
     def pores_conduct(self) -> bool:
@@ -104,9 +109,22 @@ def phases(dataset: xarray.Dataset) -> Phases:
                 f"models of two phases need particles of one material, this study mixes {in_words(particles)} and "
                 f"{in_words(other)} W/(m K): compare it as studies/mixture does"
             )
-    gas = "pressure" in dataset.coords or bool((dataset.coords.get("emissivity", pores * 0.0) > 0.0).any())
-    bind = study["contacts"].get("rule", "overlap") == "overlap" and not gas
-    return Phases(pores, particles, dataset.sizes["direction_i"], bind)
+    glow = bool((dataset.coords.get("emissivity", pores * 0.0) > 0.0).any())
+    unbound = _unbound(study["contacts"].get("rule", "overlap"), gas="pressure" in dataset.coords, glow=glow)
+    return Phases(pores, particles, dataset.sizes["direction_i"], unbound)
+
+
+def _unbound(rule: str, *, gas: bool, glow: bool) -> str:
+    """Why the bounds of two phases of known volume do not bind, or an empty text."""
+    if glow:
+        return "radiation crosses the pores beside what fills them"
+    if gas:
+        return "a gas may conduct less in narrow gaps than in wide ones"
+    if rule == "overlap":
+        return ""
+    if rule in ("hertz", "load"):
+        return "the width of the contacts follows from forces, not from the shape of the particles"
+    return "the contacts are bonds, wider than the shape of the particles makes them"
 
 
 MANY = 6

@@ -94,7 +94,7 @@ def bonded_contacts(packing: ParticlePacking, half_angle: float, bond_gap: float
     Parameters
     ----------
     packing : ParticlePacking
-        Touching, or nearly touching, disks.
+        Touching, or nearly touching, particles.
     half_angle : float [rad]
         Half-angle of every contact arc, 0 < half_angle < pi/2.
     bond_gap : float
@@ -206,12 +206,15 @@ class Rule:
     optional : tuple of str
         Keys that may be left out.
     dimensions : tuple of int
+    radii_may_grow : bool
+        Whether packers may let particles overlap to reach a density: the rule takes its contacts from overlaps.
     """
 
     contacts: Callable[..., ContactNetwork]
     keys: Mapping[str, str]
     optional: tuple[str, ...] = ()
     dimensions: tuple[int, ...] = (2, 3)
+    radii_may_grow: bool = False
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -224,12 +227,15 @@ ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", *WALL)}
 """Elastic constants of the particles and of the walls, as a study and as a rule spells them."""
 
 RULES: Mapping[str, Rule] = {
-    "overlap": Rule(overlap_contacts, {}),
+    "overlap": Rule(overlap_contacts, {}, radii_may_grow=True),
     "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
     "radius": Rule(radius_contacts, {"contact_radius": "contact_radius", "bond_gap": "bond_gap"}),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
     "hertz": Rule(
-        hertz_contacts, {**ELASTIC, "simulated_modulus": "simulated_modulus"}, (*ELASTIC, "simulated_modulus")
+        hertz_contacts,
+        {**ELASTIC, "simulated_modulus": "simulated_modulus"},
+        (*ELASTIC, "simulated_modulus"),
+        radii_may_grow=True,
     ),
     "load": Rule(
         load_contacts,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from etc_engine.box import AXES
+from etc_engine.medium.network import ContactNetwork
 from etc_engine.particle_files.precision import doubtful_contacts
 from etc_engine.particle_files.table import ParticleTable
 from etc_engine.structure.filling import find_filling, free_walls
@@ -26,6 +27,26 @@ def digit_warnings(table: ParticleTable, gap: float, *, bonded: bool) -> list[st
     """
     doubt = doubtful_contacts(table, gap)
     return [] if doubt is None else [doubt.sentence(gap, bonded=bonded)]
+
+
+def widest_gap(network: ContactNetwork) -> float:
+    """Largest gap between two particles in contact, over the mean of their radii; 0 without a gap.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> from etc_engine.medium.rules import coordination_contacts
+    >>> from etc_engine.packing import ParticlePacking
+    >>> packing = ParticlePacking([[0.2, 0.5], [0.5, 0.5]], [0.1, 0.1], Box((1.0, 1.0)))
+    >>> round(widest_gap(coordination_contacts(packing, 0.1, 1.0)), 12)
+    1.0
+    """
+    packing = network.packing
+    i, j = network.pairs.T
+    apart = packing.centers[j] - packing.centers[i] + network.shifts * np.asarray(packing.box.lengths)
+    reach = packing.radii[i] + packing.radii[j]
+    gaps = (np.linalg.norm(apart, axis=1) - reach) / (0.5 * reach)
+    return float(gaps.max(initial=0.0))
 
 
 def box_warnings(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) -> list[str]:

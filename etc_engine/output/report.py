@@ -103,6 +103,7 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
     failed = int(((status > Status.NOT_PERCOLATING) & (status < Status.NOT_RUN)).sum())
     particles = dataset["particles"].where(dataset["particles"] > 0)
     bound = "broken" if comparison.attrs["bound_broken"] else "kept"
+    unbound = comparison.attrs["bounds_unbound"]
     box = " x ".join(f"{length:g}" for length in study["packing"]["box"])
     facts = {
         "packing": _packing(study["packing"]),
@@ -113,7 +114,7 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
         "particles of a realization": _number(float(particles.mean()), ".0f"),
         "realizations of a cell": _range(dataset["count"].values.ravel().tolist()),
         "failed cells": str(failed),
-        "rigorous bounds": bound if comparison.attrs["bounds_bind"] else "do not bind bonded contacts",
+        "rigorous bounds": f"do not bind: {unbound}" if unbound else bound,
         "closest model": comparison.attrs["best_model"] or "none",
     }
     items = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>" for key, value in facts.items())
@@ -203,7 +204,7 @@ def _models(comparison: xarray.Dataset) -> str:
     binding = (
         f"The bounds bind {bound}: an asterisk is a result that breaks one."
         if comparison.attrs["bounds_bind"]
-        else "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones: they are a comparison here."
+        else f"The bounds are a comparison here, they do not bind: {comparison.attrs['bounds_unbound']}."
     )
     text = (
         f"<p>Pores of {pores} W/(m K), particles of {particles} W/(m K), at the mean solid fraction. "

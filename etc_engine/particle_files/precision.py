@@ -39,7 +39,7 @@ class Doubt:
         parts = [f"{self.pairs} pairs of particles"] * bool(self.pairs)
         parts += [f"{self.wall_pairs} particles at walls"] * bool(self.wall_pairs)
         rule = f"the bond gap of {gap:g} mean radii" if bonded else "touching"
-        wider = "a wider --bond-gap" if bonded else "--contact-angle with a --bond-gap wider than the step"
+        wider = "a wider --bond-gap" if bonded else "--rule bonded with a --bond-gap wider than the step"
         return (
             f"the file prints too few digits to decide on {' and '.join(parts)}, which are within two printed steps "
             f"({self.step:.2g} m) of {rule}: the conductivity depends on their rounding; {self.remedy}, or use {wider}"

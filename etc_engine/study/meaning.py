@@ -57,25 +57,30 @@ def chosen(study: StudyTable, place: str) -> tuple[str, ...]:
     return (NONE,) if found is None else (found if isinstance(found, str) else "a table",)
 
 
-def meaningless(study: StudyTable) -> Iterator[tuple[str, str]]:
-    """Places of the keys without a meaning in this study, and the choice that takes it from them, in words."""
+def meaningless(study: StudyTable, table: str = "") -> Iterator[tuple[str, str]]:
+    """Places of the keys without a meaning in this study, and the choice that takes it from them, in words.
+
+    With ``table`` those of one table alone.
+    """
     for place, needs in MEANING.items():
+        if table and place.partition(".")[0] != table:
+            continue
         for choice, words in needs.items():
             if not set(chosen(study, choice)) & set(words):
                 yield place, f"{choice.rpartition('.')[2]} = {', '.join(map(repr, chosen(study, choice)))}"
                 break
 
 
-def refuse_meaningless(study: StudyTable) -> None:
-    """Refuse a key that is given and has no meaning; its default may stand.
+def refuse_meaningless(study: StudyTable, table: str = "") -> None:
+    """Refuse a key that is given and has no meaning, of one table or of all; its default may stand.
 
     Raises
     ------
     ValueError
     """
-    for place, choice in meaningless(study):
-        table, key = place.split(".")
-        holder = getattr(study, table)
+    for place, choice in meaningless(study, table):
+        name, key = place.split(".")
+        holder = getattr(study, name)
         if key in holder.model_fields_set and getattr(holder, key) != type(holder).model_fields[key].default:
             raise ValueError(f"{place}: has no meaning with {choice}, take it out")
 

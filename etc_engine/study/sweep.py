@@ -226,7 +226,7 @@ class Study(StudyFile):
 
     def _packing_spec(self, density: float | None) -> PackingSpec | PackingSource:
         """What makes the packing of a realization."""
-        growth = self.contacts.rule in ("overlap", "hertz") and ENGINES[self.conduction.engine].needs_contacts
+        growth = RULES[self.contacts.rule].radii_may_grow and ENGINES[self.conduction.engine].needs_contacts
         return self.packing.spec(density, radius_growth=growth)
 
     def for_realization(self, spec: RealizationSpec, realization: int) -> RealizationSpec:  # noqa: ARG002

@@ -14,6 +14,7 @@ from etc_engine.medium.walls import WallCondition
 from etc_engine.realization import ENGINES
 from etc_engine.solvers.marching import SCHEMES
 from etc_engine.study.files import A_SEED, Seed, StudyFile, validated
+from etc_engine.study.meaning import refuse_meaningless
 from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.schema import (
     AS_LIST,
@@ -123,9 +124,9 @@ class Gradient(StudyTable):
 
 
 class Source(StudyTable):
-    """One of ``[[source]]``: heat released in each of some particles (all by default) [W/m]."""
+    """One of ``[[source]]``: heat released in each of some particles (all by default)."""
 
-    heat: Value = Field(description=f"{A_VALUE} [W/m]")
+    heat: Value = Field(description=f"{A_VALUE} [W, of disks W/m]")
     particles: Annotated[list[Annotated[int, Field(strict=True, ge=0)]], Field(min_length=1)] | None = Field(
         default=None, description="a list of whole numbers from 0, the rows of particles; all by default"
     )
@@ -264,10 +265,20 @@ class NetworkStudy(StudyFile):
             refuse_endless(self.time, self.time.times)
         except StudyError as error:
             raise ValueError(str(error)) from None
+        self._check_contacts()
+        return self
+
+    def _check_contacts(self) -> None:
+        """One value of each key that the contact rule reads, and no other key."""
         for row in QUANTITIES.values():
             if row.table == "contacts" and isinstance(getattr(self.contacts, row.key), tuple):
                 raise ValueError(f"{row.place}: a transient takes one value, found a list")
-        return self
+        refuse_meaningless(self, "contacts")
+        if self.contacts.roughness is not None:
+            raise ValueError(
+                "contacts.roughness: a transient does not compute the resistance of rough contacts, take it out and "
+                "give contacts.contact_resistance"
+            )
 
     def _check_pores(self) -> None:
         """The method takes heat through the pores, or not, as they conduct."""

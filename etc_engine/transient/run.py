@@ -15,6 +15,7 @@ from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
 from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.rules import find_rule
 from etc_engine.medium.transient import HeatSource, ParticleSystem
 from etc_engine.medium.walls import knots_of, value_at
 from etc_engine.packing import ParticlePacking, pack
@@ -258,7 +259,7 @@ def _particles(study: NetworkStudy, folder: Path) -> ParticleTable:
         if words.box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
         return read_particles(path, frame=None if words.frames == "last" else words.frames, sample=part_of(words))
-    spec = words.spec(words.density, radius_growth=study.contacts.rule == "overlap")
+    spec = words.spec(words.density, radius_growth=find_rule(study.contacts.rule).radii_may_grow)
     return ParticleTable(pack(spec, np.random.default_rng(study.seed)))
 
 

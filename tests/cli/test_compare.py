@@ -58,7 +58,7 @@ def test_table_of_every_cell_with_figure(bonded, tmp_path, capsys):
     assert rows[0][2:7] == ["0.5500", "3", f"{mean:.4f}", "+-", f"{half_width:.4f}"]
     bound = 0.55 / 1.45
     assert rows[0][7:9] == [f"{bound:.4f}", f"{100 * (bound / mean - 1):+.1f}%"]
-    assert "bind overlapping geometries, not bonded ones" in out
+    assert "they do not bind: the contacts are bonds" in out
     assert "0 because the pores insulate: hashin_shtrikman_lower, maxwell, differential" in out
     assert "fit of percolation_power_law (contact_angle 5), 4 densities: threshold 0.5" in out
     assert out.splitlines()[-1] == f"figure: {figure}"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from etc_engine.cli import run
+from etc_engine.realization import find_engine
 
 pytest.importorskip("CoolProp")
 ELASTIC = ["--youngs-modulus", "90e9", "--poisson-ratio", "0.24"]
@@ -48,6 +49,12 @@ def test_softened_run_and_load(bed, capfd):
     assert more["conductivity"] / load["conductivity"] == pytest.approx(2.0, rel=0.01)  # c ~ F^(1/3)
 
 
+def test_the_closest_pairs_give_the_coordination_number(bed, capfd):
+    """Three contacts of 27 spheres each way: 81 make a coordination number of 6."""
+    closest = solved(capfd, *bed, "--rule", "coordination", "--contact-angle", "5", "--coordination", "6")
+    assert (closest["contact_rule"], closest["contacts"], closest["coordination"]) == ("coordination", 81, 6.0)
+
+
 def test_rough_contacts_conduct_less(bed, capfd):
     smooth = solved(capfd, *bed, "--load", "1e6", *ELASTIC)
     rough = solved(capfd, *bed, "--load", "1e6", *ELASTIC, "--roughness", "1e-6,0.1,4e9")
@@ -60,14 +67,44 @@ def test_a_material_at_its_temperature(bed, capfd):
     assert steel["conductivity"] / one["conductivity"] == pytest.approx(19.9756, rel=1e-4)
 
 
+def test_what_touches_is_judged_by_the_rule(tmp_path, capfd):
+    """Spheres a thousandth of a radius apart: the load and the closest pairs bridge the gap, Hertz does not."""
+    file = tmp_path / "apart.csv"
+    file.write_text("x,y,z,radius\n0.25,0.25,0.25,0.24975\n0.75,0.25,0.25,0.24975\n")
+    words = [str(file), "--box", "1,0.5,0.5"]
+    for options in (
+        ["--load", "1e6", *ELASTIC, "--bond-gap", "0.01"],
+        ["--rule", "coordination", "--contact-angle", "5", "--coordination", "1"],
+    ):
+        assert run(["solve", *words, *options, "--json"]) == 0
+        done = capfd.readouterr()
+        assert json.loads(done.out)["contacts"] == 1
+        assert "touches the driven wall" not in done.err
+    assert run(["solve", *words, "--rule", "hertz"]) == 0
+    error = capfd.readouterr().err
+    assert "no particles overlap" in error and "--rule bonded or load instead of hertz" in error
+    assert "nothing touches the driven wall" in error
+
+
+def test_the_help_names_every_method(capfd):
+    assert run(["solve", "--help"]) == 0
+    words = capfd.readouterr().out.replace(",", " ").replace(".", " ").split()
+    for engine in ("dtem", "pipe"):
+        assert set(find_engine(engine).methods) <= set(words)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--rule", "hertz", "--bond-gap", "0.1"], "--bond-gap means nothing to the contact rule hertz"),
         (["--rule", "hertzian"], "unknown contact rule"),
         (["--rule", "load"], "also needs --load"),
         (["--rule", "overlap", "--youngs-modulus", "1e9"], "means nothing to the contact rule overlap"),
         (["--rule", "hertz", "--simulated-modulus", "1e8"], "also needs --youngs-modulus"),
         (["--load", "1e6", "--youngs-modulus", "90e9"], "also needs --poisson-ratio"),
+        (["--rule", "coordination", "--contact-angle", "5"], "also needs --coordination"),
+        (["--rule", "coordination", "--coordination", "6"], "also needs --contact-angle"),
+        (["--rule", "hertz", "--coordination", "6"], "--coordination means nothing to the contact rule hertz"),
         (["--roughness", "1e-6"], "takes height, slope and hardness"),
         (["--gas", "helium", "--pressure", "1e5"], "needs a temperature"),
         (["--gas", "helium", "--pressure", "1e5", "--temperature", "300", "--pore-conductivity", "1"], "leave one"),

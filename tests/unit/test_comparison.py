@@ -60,6 +60,7 @@ def test_a_binding_bound_may_be_reached_and_not_passed(made_sweep):
 def test_bonded_contacts_are_told_but_not_bound(made_sweep):
     result = evaluate_models(made_sweep(BONDED, lambda *_: 1.99))
     assert result.attrs["bounds_bind"] == 0
+    assert result.attrs["bounds_unbound"].startswith("the contacts are bonds")
     assert result.attrs["bound_broken"] == 0
     assert not result["bound_broken"].any()
     assert not result["inside_bounds"].any()

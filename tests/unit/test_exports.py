@@ -16,6 +16,7 @@ import xarray as xr
 from etc_engine.errors import InputError
 from etc_engine.output.exports import EXPORTS, curves_of, fit_curve
 from etc_engine.output.exports.curves import Curve
+from etc_engine.study.quantities import QUANTITIES
 
 TEMPERATURE = np.array([300.0, 450.0, 600.0, 750.0, 900.0, 1050.0])
 PRESSURE = np.array([1e3, 1e5])
@@ -44,7 +45,11 @@ def sweep(pressures=PRESSURE, temperatures=TEMPERATURE, realizations=9, scatter=
             "solid_fraction": (dims, np.full(shape, 0.6)),
             "status": (dims, np.zeros(shape, dtype=int)),
         },
-        coords={"density": [0.6], "pressure": list(pressures), "temperature": list(temperatures)},
+        coords={
+            "density": ("density", [0.6], QUANTITIES["density"].attributes(3)),
+            "pressure": ("pressure", list(pressures), QUANTITIES["pressure"].attributes(3)),
+            "temperature": ("temperature", list(temperatures), QUANTITIES["temperature"].attributes(3)),
+        },
         attrs={
             "study_resolved": json.dumps({"name": "pebble bed"}),
             "confidence_level": 0.95,
@@ -110,6 +115,14 @@ def test_csv_holds_every_cell_with_its_interval():
     np.testing.assert_array_equal(mean, np.concatenate([curve.conductivity for curve in curves]))
     assert (table[:, 4] < mean).all() and (mean < table[:, 5]).all() and (table[:, 6] == 9).all()
     assert "intervals of 95 %" in text and "commit: abc" in text
+
+
+def test_csv_takes_units_from_the_result():
+    """Every dimension with a unit has it in the header, whether it is varied or fixed."""
+    resistance = QUANTITIES["contact_resistance"].attributes(2)
+    data = sweep().assign_coords(contact_resistance=((), 2.0, resistance))
+    header = next(line for line in EXPORTS["csv"](*curves_of(data, {})).splitlines() if not line.startswith("#"))
+    assert header.split(",")[:4] == ["density", "pressure [Pa]", "contact_resistance [m K/W]", "temperature [K]"]
 
 
 def test_moose_reads_back_as_a_table_and_a_polynomial():

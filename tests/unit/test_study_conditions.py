@@ -194,6 +194,7 @@ def test_bed_models_take_their_inputs_from_the_result(made_sweep):
     assert found.values.item() == pytest.approx(float(expected), rel=1e-12)
     assert comparison["input_diameter"].values.item() == pytest.approx(diameter, rel=1e-12)
     assert not comparison.attrs["bounds_bind"]
+    assert comparison.attrs["bounds_unbound"].startswith("radiation crosses the pores")
     lines = model_lines(comparison)["model_conductivity"]
     at = lines.sel(model="zehner_bauer_schluender", pressure=1e3, temperature=800.0)
     assert at.values.ravel()[0] == pytest.approx(float(expected), rel=1e-12)

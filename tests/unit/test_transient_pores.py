@@ -32,12 +32,15 @@ SPHERES = {
     "time": {"scheme": "bdf2", "steps": 20, "times": [0.0, 0.1, 1.0, 8.0]},
 }
 
+ROUGH = {"height": 1e-6, "slope": 0.1, "hardness": 4e9}
+HERTZ = {"rule": "hertz", "youngs_modulus": 6e10, "poisson_ratio": 0.25}
+
 
 def study_of(**changes):
     content = copy.deepcopy(SPHERES)
     for place, value in changes.items():
-        table, key = place.split("__")
-        content.setdefault(table, {})[key] = value
+        table, _, key = place.partition("__")
+        content[table] = {**content.get(table, {}), key: value} if key else value
     return parse_study(content)
 
 
@@ -51,6 +54,22 @@ def test_spheres_in_a_gas_end_at_the_steady_state(tmp_path):
     steady = effective_conductivity(medium, method="facets", axes=(2,)).solutions[0].sphere_temperatures[:, 0]
     late = transient.system.particle_temperatures(transient.states[-1].temperatures)
     np.testing.assert_allclose(late, steady, atol=1e-4)
+
+
+@pytest.mark.parametrize("rule", ["overlap", "hertz"])
+def test_a_transient_packs_for_a_contact_rule_as_a_sweep_does(rule, tmp_path):
+    """Both rules take contacts from overlaps, so radii grow to the density, which touching disks cannot reach."""
+    packing = {"method": "advancing-front", "radii": "equal:0.1", "density": 0.9, "box": [1.0, 1.0]}
+    disks = study_of(
+        packing=packing,
+        contacts={"rule": rule},
+        pores={},
+        conduction={"engine": "pipe"},
+        walls={"left": {"type": "fixed", "value": 1.0}},
+        time={"scheme": "bdf2", "steps": 1, "times": [0.0, 0.1]},
+    )
+    found = run_transient(disks, tmp_path).network.packing
+    assert found.density == pytest.approx(0.9, abs=1e-9)
 
 
 def test_without_pores_the_method_is_that_of_the_contacts():
@@ -67,6 +86,11 @@ def test_without_pores_the_method_is_that_of_the_contacts():
         ({"pores__conductivity": -1.0}, "pores.conductivity"),
         ({"pores__conductivity": 0.0}, "only if they conduct"),
         ({"pores__conductivity": 0.0, "pores__heat_capacity": 0.0, "conduction__method": "facets"}, "do not conduct"),
+        ({"contacts__contact_angle": 5.0}, r"contacts\.contact_angle: has no meaning with rule = 'overlap'"),
+        ({"contacts__load": 1e5}, r"contacts\.load: has no meaning with rule = 'overlap'"),
+        ({"contacts": {"rule": "bonded", "contact_angle": 5.0, "coordination": 4.0}}, "coordination: has no meaning"),
+        ({"contacts": {**HERTZ, "roughness": ROUGH}}, r"contacts\.roughness: a transient does not compute"),
+        ({"contacts": {**HERTZ, "youngs_modulus": [1e9, 2e9]}}, r"youngs_modulus: a transient takes one value"),
     ],
 )
 def test_what_does_not_fit_is_refused(changes, words):

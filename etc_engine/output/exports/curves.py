@@ -59,11 +59,14 @@ class Source:
     confidence : float
     attributes : mapping
         Global attributes of the result: commit, command, versions.
+    units : mapping
+        Of the coordinates that have a dimension, in the spelling of CF.
     """
 
     study: str
     confidence: float
     attributes: Mapping[str, Any]
+    units: Mapping[str, str]
 
     @property
     def lines(self) -> list[str]:
@@ -109,7 +112,9 @@ def curves_of(dataset: xarray.Dataset, at: Mapping[str, str]) -> tuple[list[Curv
     if not curves:
         raise InputError("no cell of this result has a conductivity to export: see `etc-engine info`")
     confidence = float(dataset.attrs.get("confidence_level", 0.95))
-    return curves, Source(str(study.get("name", "")), confidence, dict(dataset.attrs))
+    units = {str(name): str(dataset[name].attrs.get("units", "1")) for name in values.coords if name in dataset}
+    with_units = {name: unit for name, unit in units.items() if unit != "1"}
+    return curves, Source(str(study.get("name", "")), confidence, dict(dataset.attrs), with_units)
 
 
 def _curve(cell: xarray.Dataset, fixed: Mapping[str, Any]) -> Curve:

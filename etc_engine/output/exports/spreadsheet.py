@@ -6,8 +6,7 @@ from math import isfinite
 
 from etc_engine.output.exports.curves import Curve, Source, described
 from etc_engine.output.exports.fit import fit_curve
-
-UNITS = {"temperature": "K", "pressure": "Pa", "contact_angle": "degree", "youngs_modulus": "Pa"}
+from etc_engine.study.quantities import readable
 
 
 def to_csv(curves: list[Curve], source: Source) -> str:
@@ -25,7 +24,7 @@ def to_csv(curves: list[Curve], source: Source) -> str:
     names = list(curves[0].at)
     has_temperature = curves[0].temperature.size > 0
     header = [*names, *(["temperature"] if has_temperature else [])]
-    header = [f"{name} [{UNITS[name]}]" if name in UNITS else name for name in header]
+    header = [f"{name} [{readable(source.units[name])}]" if name in source.units else name for name in header]
     lines.append(",".join([*header, "conductivity [W/(m K)]", "low [W/(m K)]", "high [W/(m K)]", "count"]))
     for curve in curves:
         for i, k in enumerate(curve.conductivity):

@@ -32,7 +32,7 @@ DECADES = 1.3
 
 MOST_PANELS = 12
 
-BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping geometries only, not bonded ones"
+BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping particles"
 
 SHORT = {
     "series": "series",
@@ -291,6 +291,8 @@ def _notes(comparison: xarray.Dataset) -> str:
     ]
     if zero and not comparison.attrs["pores_conduct"]:
         notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
-    if not comparison.attrs["bounds_bind"] or not comparison.attrs["pores_conduct"]:
+    if comparison.attrs["bounds_unbound"]:
+        notes.append(f"Hashin-Shtrikman bounds do not bind:\n{comparison.attrs['bounds_unbound']}.")
+    elif not comparison.attrs["pores_conduct"]:
         notes.append(f"{BOUNDS_NOTE}.")
     return "\n".join(notes)
