@@ -264,8 +264,8 @@ def _load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:
     box = medium.box
     if word == "all" or (word is None and all(box.periodic)):
         return tuple(range(box.dimension))
-    word = word or "x"
-    if word not in AXES[: box.dimension]:
+    word = "x" if word is None else word
+    if word not in tuple(AXES[: box.dimension]):
         raise InputError(f"--axis is one of {', '.join(AXES[: box.dimension])} or all, found {word!r}")
     return (AXES.index(word),)
 

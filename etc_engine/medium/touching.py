@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from etc_engine.arrays import Floats, Ints
-from etc_engine.errors import InputError
+from etc_engine.errors import GeometryError, InputError
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 
@@ -34,10 +34,42 @@ class Neighbors:
 
 
 def find_neighbors(packing: ParticlePacking, gap: float) -> Neighbors:
-    """Particles and walls whose surfaces are at most a gap apart, in mean radii of a pair and radii at a wall."""
+    """Particles and walls whose surfaces are at most a gap apart, in mean radii of a pair and radii at a wall.
+
+    Raises
+    ------
+    GeometryError
+        If a particle lies inside another, or its centre behind the plane of their common rim.
+    """
     near = neighbor_pairs(packing, relative_gap=gap)
+    refuse_swallowed(packing, near.pairs, near.gaps)
     wall_particles, walls, _ = wall_distances_within(packing, gap, 1.0)
     return Neighbors(packing, near.pairs, near.shifts, wall_particles, walls)
+
+
+def refuse_swallowed(packing: ParticlePacking, pairs: Ints, gaps: Floats) -> None:
+    """Refuse pairs of which one particle lies inside the other, or reaches over the other's centre plane.
+
+    With the distance d of the centres: d <= abs(R_i - R_j), and d^2 <= abs(R_i^2 - R_j^2), where the half-angle
+    of the overlap seen from the smaller particle reaches 90 degrees.
+
+    Raises
+    ------
+    GeometryError
+    """
+    r_i, r_j = packing.radii[pairs].T
+    distance = (r_i + r_j) + gaps
+    for bad, what in (
+        (distance <= np.abs(r_i - r_j), "one lies inside the other"),
+        (distance**2 <= np.abs(r_i**2 - r_j**2), "the smaller one has its centre behind their common rim"),
+    ):
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            i, j = pairs[row]
+            raise GeometryError(
+                f"particles {i} and {j}: {what} (radii {r_i[row]:.6g} and {r_j[row]:.6g}, centres "
+                f"{distance[row]:.6g} apart); remove one of them"
+            )
 
 
 def closest_neighbors(packing: ParticlePacking, coordination: float) -> Neighbors:

@@ -85,7 +85,7 @@ def test_closest_pairs_give_the_coordination_number_wanted(wanted):
     packing = ParticlePacking(centers, rng.uniform(0.001, 0.003, 300), Box((1.0, 1.0), (True, True)))
     with pytest.raises(InputError, match="out of reach"):
         coordination_contacts(packing, 0.1, wanted)
-    bigger = packing.with_radii(packing.radii * 8.0)
+    bigger = packing.with_radii(np.full(300, 0.016))  # of one size, none lies inside another
     network = coordination_contacts(bigger, 0.1, wanted)
     assert network.coordination == pytest.approx(wanted, abs=1.0 / 300)
 
