@@ -98,6 +98,7 @@ def solve_command(
     import numpy as np
 
     from etc_engine.cli.options import print_json
+    from etc_engine.errors import InputError
     from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings
     from etc_engine.realization import field_along, find_engine
 
@@ -114,8 +115,16 @@ def solve_command(
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
     between = asked.between_walls(medium, method, axes)
-    field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
-    record = {**_record(asked, method, result, field, axes), **between}
+    try:
+        field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
+    except InputError:
+        if full or outputs.wanted:
+            raise
+        field = None  # a method without fields still has its conductivity
+    record = {**_record(asked, method, result, medium if field is None else field.medium, axes), **between}
+    if field is not None:
+        each = zip(field.medium.links.pairs.tolist(), field.contact_temperatures.tolist(), strict=True)
+        record["contact_temperatures"] = [{"particles": pair, "temperature": value} for pair, value in each]
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
     if not medium.pores.conduct:
@@ -126,10 +135,11 @@ def solve_command(
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
     warn(box_warnings(table, driven, gap))
     warn(excess_warnings(result.tensor, np.append(medium.conductivity, medium.pores.conductivity)))
-    _write(outputs, field, record, table)
+    if field is not None:
+        _write(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
     if not full:
-        del record["contact_temperatures"]
+        record.pop("contact_temperatures", None)
     if as_json:
         print_json(record)
     else:
@@ -278,6 +288,11 @@ class _Outputs:
     vtk: Path | None
     plot: Path | None
 
+    @property
+    def wanted(self) -> bool:
+        """Whether any file is."""
+        return any(path is not None for path in (self.netcdf, self.vtk, self.plot))
+
     def check(self, particles: Path) -> None:
         """Refuse what cannot be written, or would replace the input, before the work begins."""
         from etc_engine.cli.options import check_picture, check_place
@@ -375,7 +390,7 @@ def _warn_of_missing_contacts(network: ContactNetwork, asked: _Asked, *, given: 
 
 
 def _record(
-    asked: _Asked, method: str, result: EffectiveConductivity[Any], field: ParticleField, axes: tuple[int, ...]
+    asked: _Asked, method: str, result: EffectiveConductivity[Any], medium: Medium, axes: tuple[int, ...]
 ) -> dict[str, Any]:
     import numpy as np
 
@@ -383,7 +398,7 @@ def _record(
     from etc_engine.realization import Status
     from etc_engine.structure.filling import find_filling
 
-    medium, network, axis = field.medium, field.medium.links, axes[0]
+    network, axis = medium.links, axes[0]
     percolates = bool(result.spans[axis])
     status = Status.OK if percolates else Status.NOT_PERCOLATING
     record: dict[str, Any] = {
@@ -414,10 +429,6 @@ def _record(
         "status_name": status.name.lower(),
         "iterations": result.iterations,
         "relative_energy_error": result.relative_energy_error,
-        "contact_temperatures": [
-            {"particles": pair, "temperature": temperature}
-            for pair, temperature in zip(network.pairs.tolist(), field.contact_temperatures.tolist(), strict=True)
-        ],
     }
 
 
