@@ -223,7 +223,7 @@ def test_low_coordination_is_reported():
 def test_hidden_spheres_and_bad_material_are_refused():
     box = Box((1.0, 1.0, 1.0), (True, True, True))
     hidden = ParticlePacking([[0.5, 0.5, 0.5], [0.6, 0.5, 0.5]], [0.4, 0.05], box)
-    with pytest.raises(GeometryError, match="particle 1"):
+    with pytest.raises(GeometryError, match="particles 0 and 1"):
         facet_links(bonded_contacts(hidden, 0.1))
     links = facet_links(overlap_contacts(lattice("bcc", 2.01)))
     for arguments, words in (
