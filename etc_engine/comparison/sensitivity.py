@@ -1,4 +1,4 @@
-"""How strongly the conductivity of a sweep answers to each of its dimensions."""
+"""Sensitivity of the conductivity of a sweep to each of its dimensions."""
 
 from __future__ import annotations
 

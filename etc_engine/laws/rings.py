@@ -314,7 +314,7 @@ def _ring_matrix(
 def _condense(rows, disks, tables, resistances, shapes):  # type: ignore[no-untyped-def]
     """(h_1, h_2, R_gap) and the shape w of each pair: (H_1 + H_2 + diag(1/G)) q = e, w = q/sum q.
 
-    All rings and every second edge: the error goes with the square of the spacing, h = (4 h_all - h_half)/3.
+    All rings and every second edge: the error is proportional to the square of the spacing, h = (4 h_all - h_half)/3.
     """
     caps, b = np.zeros((2, MODES, MODES)), np.empty((2, RINGS + 1))
     m, factor = np.zeros((2, MODES, MODES)), np.zeros((MODES, MODES))

@@ -111,7 +111,7 @@ def exact_potentials(sides: ContactSides, conductivity: Floats, flows: Floats) -
     Parameters
     ----------
     sides : ContactSides
-        All sides of a network; ``cuts`` tells which of its wall contacts are insulated chords, the other ones
+        All sides of a network; ``cuts`` says which of its wall contacts are insulated chords, the other ones
         without flux are points of the arc.
     conductivity : ndarray, shape (n,) [W/(m K)]
     flows : ndarray, shape (s, modes) [W/m]

@@ -124,7 +124,7 @@ def exact_sphere_potentials(sides: ContactSides, conductivity: Floats, flows: Fl
     Parameters
     ----------
     sides : ContactSides
-        All sides of a network; ``cuts`` tells which of its wall contacts are cut. Other contacts without flux are
+        All sides of a network; ``cuts`` says which of its wall contacts are cut. Other contacts without flux are
         read in the uncut sphere.
     conductivity : ndarray, shape (n,) [W/(m K)]
     flows : ndarray, shape (s, modes) [W]
