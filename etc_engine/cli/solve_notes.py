@@ -1,0 +1,61 @@
+"""What ``etc-engine solve`` reports of contacts that a crop cuts, and of contacts that are missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from etc_engine.cli.solve_request import SolveRequest
+
+if TYPE_CHECKING:
+    from etc_engine.medium.medium import Medium
+    from etc_engine.medium.network import ContactNetwork
+    from etc_engine.particle_files.table import ParticleTable
+
+
+def trim_cropped_walls(medium: Medium, table: ParticleTable, axes: tuple[int, ...]) -> Medium:
+    """The medium as the driven walls of a crop leave it; the user is told what they go through."""
+    import numpy as np
+
+    from etc_engine.medium.cut_contacts import trim_crop
+
+    driven = np.repeat(np.isin(np.arange(medium.dimension), axes), 2)
+    walls = np.array(table.cropped or (False,) * driven.size) & driven
+    if not (medium.links.geometric and walls.any()):
+        return medium
+    network, deep, cut = trim_crop(medium.links, walls)
+    if deep:
+        text = f"the crop goes through the middle of {deep} particles; their cut is taken at 75 degrees"
+        click.echo(f"etc-engine: warning: {text}", err=True)
+    if cut:
+        text = f"the crop goes through {cut} contacts between particles, which are left out"
+        click.echo(f"etc-engine: warning: {text}", err=True)
+    return medium.with_network(network)
+
+
+def warn_of_missing_contacts(network: ContactNetwork, asked: SolveRequest, *, given: bool) -> None:
+    """A packing without a single contact is most likely a misunderstanding about the contact rule, or their file."""
+    from etc_engine.packing.neighbors import neighbor_pairs
+
+    packing = network.packing
+    if network.count or packing.count < 2:
+        return
+    near = neighbor_pairs(packing, relative_gap=1.0)
+    if not near.count:
+        return
+    closest = float((near.gaps / (0.5 * packing.radii[near.pairs].sum(axis=1))).min())
+    if given:
+        rule, remedy = "the file of contacts has none between these particles", "see --contacts"
+    elif asked.closest:
+        rule, remedy = f"--coordination {asked.physics.coordination:g} makes no contact", "give a larger one"
+    elif asked.takes_gap:
+        rule, remedy = f"no surfaces are within {asked.bond_gap:g} mean radii", "see --bond-gap"
+    else:
+        instead = "--contact-angle" if asked.rule == "overlap" else f"--rule bonded or load instead of {asked.rule}"
+        rule, remedy = "no particles overlap", f"touching particles conduct with {instead}"
+    click.echo(
+        f"etc-engine: warning: {rule}, so nothing conducts; the closest pair is {max(closest, 0.0):.2g} mean radii "
+        f"apart: {remedy}",
+        err=True,
+    )
