@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.arrays import Ints
+from etc_engine.durable import apart
 from etc_engine.errors import InputError
 
 NUMPY = b"\x93NUMPY"
@@ -121,6 +122,9 @@ def _numpy(path: Path) -> NDArray[np.generic]:
 def _tiff(path: Path) -> NDArray[np.generic]:
     if find_spec("tifffile") is None:
         raise InputError("TIFF needs the library tifffile: install the extra with pip install 'etc-engine[images]'")
+    trouble = apart.why_unreadable(path, apart.TIFF)
+    if trouble:
+        raise InputError(f"{path} cannot be read as TIFF: {trouble}")
     tifffile = import_module("tifffile")
     logger = logging.getLogger("tifffile")
     quiet, logger.disabled = logger.disabled, True  # what goes wrong is raised

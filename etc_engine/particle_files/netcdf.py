@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.box import AXES, Box, parse_periodic
+from etc_engine.durable.apart import NETCDF, why_unreadable
 from etc_engine.errors import InputError
 from etc_engine.particle_files.digits import EXACT, SINGLE, Digits, PrintedColumn, PrintedColumns
 from etc_engine.particle_files.sample import Rows, Sample, make_table
@@ -91,11 +92,14 @@ def netcdf_rows(path: Path) -> Rows:
     """
     import xarray
 
+    if not path.exists():
+        raise InputError(f"there is no file {path}")
+    trouble = why_unreadable(path, NETCDF)
+    if trouble:
+        raise InputError(f"{path} cannot be read as netCDF: {trouble}")
     try:
         with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
             dataset.load()
-    except FileNotFoundError:
-        raise InputError(f"there is no file {path}") from None
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} cannot be read as netCDF: {error}") from None
     box = _box(path, dataset.attrs)

@@ -1,38 +1,44 @@
 """The result file of a sweep: written whole with a checksum of its data, and read only if it can be.
 
-A damaged HDF5 file can keep the netCDF library busy for ever or end the process, so that a process of its own reads
-each file first, within a time limit. A flipped bit that leaves the file readable shows in the checksum.
+A process of its own reads each file first, within a time limit (:mod:`etc_engine.durable.apart`). A flipped bit that
+leaves the file readable shows in the checksum.
 """
 
 from __future__ import annotations
 
 import hashlib
-import subprocess
-import sys
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from etc_engine.durable.apart import NETCDF, why_unreadable
 from etc_engine.durable.files import replacing
 from etc_engine.errors import OutputError
 
 if TYPE_CHECKING:
     import xarray
 
-SECONDS, BYTES_PER_SECOND = 30.0, 5e6
-"""Time a file may take to be read: so long, and the time of its bytes at this rate."""
-
-READER = """
-import sys, netCDF4
-with netCDF4.Dataset(sys.argv[1]) as file:
-    for variable in file.variables.values():
-        variable[...]
-"""
+WITH_ATTRIBUTES = "2:"
+"""Begins a checksum that is of the attributes too."""
 
 
-def checksum(dataset: xarray.Dataset) -> str:
-    """SHA-256 of the names, dimensions, types and values of all variables, coordinates included; attributes are not."""
+def checksum(dataset: xarray.Dataset, *, attributes: bool = True) -> str:
+    """SHA-256 of the names, dimensions, types and values of all variables, and of the attributes but ``checksum``.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    attributes : bool
+        False for files of earlier versions, whose checksum is of the variables alone.
+
+    Returns
+    -------
+    str
+        In hexadecimal digits; with the attributes, `WITH_ATTRIBUTES` stands before them.
+    """
     whole = hashlib.sha256()
     for name in sorted(str(name) for name in dataset.variables):
         variable = dataset.variables[name]
@@ -43,7 +49,18 @@ def checksum(dataset: xarray.Dataset) -> str:
             whole.update(little.dtype.str.encode() + np.ascontiguousarray(little).tobytes())
         else:  # words, in whatever way they are held
             whole.update("\0".join(str(value) for value in values.ravel().tolist()).encode())
-    return whole.hexdigest()
+        if attributes:
+            whole.update(_words(variable.attrs))
+    if not attributes:
+        return whole.hexdigest()
+    whole.update(_words(dataset.attrs))
+    return WITH_ATTRIBUTES + whole.hexdigest()
+
+
+def _words(attributes: Mapping[Any, Any]) -> bytes:
+    """Attributes as they come back from a file: a list of one value is that value, and a number has no width."""
+    held = {str(name): np.ravel(np.asarray(value)).tolist() for name, value in attributes.items() if name != "checksum"}
+    return json.dumps(held, sort_keys=True).encode()
 
 
 def write_dataset(dataset: xarray.Dataset, output: Path) -> None:
@@ -86,7 +103,9 @@ def load_netcdf(path: Path) -> xarray.Dataset:
     """
     import xarray
 
-    refuse_unreadable(path)
+    trouble = why_unreadable(path, NETCDF)
+    if trouble:
+        raise OutputError(f"cannot read {path}: {trouble}")
     try:
         with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as stored:
             dataset = stored.load()
@@ -94,37 +113,13 @@ def load_netcdf(path: Path) -> xarray.Dataset:
         raise OutputError(f"cannot read {path}: {error.strerror or error}") from None
     except (AttributeError, RuntimeError, ValueError, KeyError, IndexError, UnicodeDecodeError) as error:
         raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({error})") from None
-    if dataset.attrs.get("checksum", "") not in ("", checksum(dataset)):
+    written = str(dataset.attrs.get("checksum", ""))
+    if written not in ("", checksum(dataset, attributes=written.startswith(WITH_ATTRIBUTES))):
         raise OutputError(
             f"{path} is damaged: its data do not have the checksum that was written with them; take a copy, or run "
             "the study again"
         )
     return dataset
-
-
-def refuse_unreadable(path: Path) -> None:
-    """Refuse a file that the netCDF library cannot read to its end within a time limit, in a process of its own.
-
-    Raises
-    ------
-    OutputError
-    """
-    try:
-        size = path.stat().st_size
-    except OSError as error:
-        raise OutputError(f"cannot read {path}: {error.strerror}") from None
-    limit = SECONDS + size / BYTES_PER_SECOND
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", READER, str(path)], capture_output=True, text=True, timeout=limit, check=False
-        )
-    except subprocess.TimeoutExpired:
-        raise OutputError(
-            f"cannot read {path}: the netCDF library does not come to an end within {limit:.0f} s, the file is damaged"
-        ) from None
-    if done.returncode:
-        said = (done.stderr.strip().splitlines() or [f"the reading process ended with {done.returncode}"])[-1]
-        raise OutputError(f"cannot read {path}: it is damaged or no netCDF file ({said})")
 
 
 def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:

@@ -11,8 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from etc_engine.box import Box
+from etc_engine.durable import apart
 from etc_engine.errors import EtcError, InputError
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files import netcdf
 from etc_engine.particle_files.formats import format_to_read, format_to_write, read_particles, write_particles
 from etc_engine.particle_files.table import ParticleTable
 
@@ -124,3 +126,12 @@ def test_formats_load_neither_xarray_nor_vtk_before_they_are_needed():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+def test_a_netcdf_packing_that_keeps_the_reader_busy_is_given_up(tmp_path, monkeypatch):
+    packing = ParticlePacking([[0.5, 0.5]], [0.2], Box((1.0, 1.0)))
+    write_particles(tmp_path / "a.nc", ParticleTable(packing))
+    monkeypatch.setattr(netcdf, "NETCDF", "while True: pass")
+    monkeypatch.setattr(apart, "SECONDS", 0.5)
+    with pytest.raises(InputError, match="does not come to an end"):
+        read_particles(tmp_path / "a.nc")

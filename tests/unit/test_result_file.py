@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
+from etc_engine.durable import apart
 from etc_engine.errors import OutputError
 from etc_engine.sweep import result_file
 from etc_engine.sweep.result_file import checksum, open_dataset, write_dataset
@@ -58,7 +60,7 @@ def test_the_checksum_is_of_names_types_and_coordinates(dataset, change):
 
 def test_damaged_files_are_refused_and_none_hangs(dataset, tmp_path, monkeypatch):
     """Cut and scribbled copies of one file; a few of them are read as they were, none gives other numbers."""
-    monkeypatch.setattr(result_file, "SECONDS", 10.0)
+    monkeypatch.setattr(apart, "SECONDS", 10.0)
     write_dataset(dataset, tmp_path / "good.nc")
     content, rng = (tmp_path / "good.nc").read_bytes(), np.random.Generator(np.random.PCG64(1234))
     for number in range(6):
@@ -78,8 +80,8 @@ def test_damaged_files_are_refused_and_none_hangs(dataset, tmp_path, monkeypatch
 
 def test_a_reader_that_does_not_end_is_given_up(dataset, tmp_path, monkeypatch):
     write_dataset(dataset, tmp_path / "out.nc")
-    monkeypatch.setattr(result_file, "READER", "while True: pass")
-    monkeypatch.setattr(result_file, "SECONDS", 0.5)
+    monkeypatch.setattr(result_file, "NETCDF", "while True: pass")
+    monkeypatch.setattr(apart, "SECONDS", 0.5)
     with pytest.raises(OutputError, match="does not come to an end"):
         open_dataset(tmp_path / "out.nc")
 
@@ -96,3 +98,15 @@ def test_a_failing_machine_leaves_no_result(error, monkeypatch):
 
     with pytest.raises(OutputError, match="continue with --resume"):
         run_unit(SimpleNamespace(seed=5, for_realization=lambda spec, _: spec), None, Unit(0.7, 3), 0, fail)
+
+
+def test_attributes_belong_to_the_checksum_except_in_older_files(dataset, tmp_path):
+    """An attribute decides the confidence level of every figure; files of earlier versions stay readable."""
+    write_dataset(dataset, tmp_path / "out.nc")
+    with netCDF4.Dataset(tmp_path / "out.nc", "a") as file:
+        file.study_digest = "1" + "0" * 63
+    with pytest.raises(OutputError, match="checksum"):
+        open_dataset(tmp_path / "out.nc")
+    older = dataset.assign_attrs(checksum=checksum(dataset, attributes=False))
+    older.to_netcdf(tmp_path / "older.nc", engine="netcdf4")
+    assert open_dataset(tmp_path / "older.nc").attrs["study_digest"] == "0" * 64

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from etc_engine.durable import apart
 from etc_engine.engines.voxel.images import homogenize_image
 from etc_engine.errors import InputError
 from etc_engine.particle_files.images import is_image, read_image
@@ -85,3 +86,19 @@ def test_phases_without_a_conductivity_are_named():
         homogenize_image(np.array([[0, 3]]), {0: 1.0}, (1.0, 1.0))
     with pytest.raises(InputError, match="label 3 must not be negative"):
         homogenize_image(np.array([[0, 3]]), {0: 1.0, 3: -1.0}, (1.0, 1.0))
+
+
+def test_a_damaged_tiff_that_keeps_the_reader_busy_is_given_up(tmp_path, monkeypatch):
+    """One flipped bit: the offset of the second page leads into the voxels, and the library does not come back."""
+    tifffile = pytest.importorskip("tifffile", reason="needs the extra 'images'")
+    path = tmp_path / "a.tif"
+    values = (np.arange(4 * 8 * 8).reshape(4, 8, 8) % 3).astype(np.uint8)
+    tifffile.imwrite(path, values, photometric="minisblack", metadata=None)
+    content = bytearray(path.read_bytes())
+    begin = int.from_bytes(content[4:8], "little")
+    second = begin + 2 + 12 * int.from_bytes(content[begin : begin + 2], "little")
+    content[second] ^= 0x20
+    path.write_bytes(content)
+    monkeypatch.setattr(apart, "SECONDS", 2.0)
+    with pytest.raises(InputError, match="read as TIFF: the reading library does not come to an end within 2"):
+        read_image(path)
