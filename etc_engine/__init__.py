@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from etc_engine.solvers.marching import march
     from etc_engine.structure.union import solid_fraction
 
+__version__ = "0.2.0"
+
 _HOMES = {
     "Box": "box",
     "ContactNetwork": "medium.network",

@@ -1,0 +1,94 @@
+"""Configuration of the guide: ``sphinx-build -W -c studies/site studies build/site``.
+
+The sources are the pages of this folder, the README of every study beside it and the docstrings of the package.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import etc_engine
+
+STUDIES = Path(__file__).parents[1]
+OUTSIDE = {"CHANGELOG.md": "changelog", "tests/VALIDATION.md": "validation", "jobs/README.md": "cluster"}
+"""Files above the sources, and the page of this folder that includes each."""
+
+project = "etc_engine"
+author = "the etc_engine authors"
+copyright = author
+release = version = etc_engine.__version__
+
+root_doc = "site/index"
+extensions = ["myst_parser", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
+exclude_patterns = ["**/__pycache__"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+nitpicky = False
+
+html_theme = "alabaster"
+html_theme_options = {"description": "Effective thermal conductivity of particle systems", "page_width": "1100px"}
+html_show_sourcelink = False
+
+myst_enable_extensions = ["dollarmath", "deflist"]
+myst_heading_anchors = 3
+
+autodoc_typehints = "none"  # the docstrings name shapes and units
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+
+def gallery() -> str:
+    """Return one row per study: its picture, its title and its question."""
+    rows = []
+    for page in sorted(STUDIES.glob("*/README.md")):
+        text = page.read_text()
+        title = re.search(r"^# (.*)", text, re.M)
+        image = re.search(r"!\[(.*?)\]\((\S+?\.png)\)", text)
+        if title and image:
+            name = page.parent.name
+            rows.append(f"| [{title[1]}](../{name}/README.md) | ![{image[1]}](../{name}/{image[2]}) |")
+    return "\n".join(["| study | result |", "| --- | --- |", *rows])
+
+
+def without_bars(lines: list[str]) -> list[str]:
+    """Escape the bars of absolute values, which mean substitutions in reStructuredText, outside of literal text."""
+    out, literal = [], -1  # indentation of the line that opened a literal block
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if literal >= 0 and line.strip() and indent <= literal:
+            literal = -1
+        if literal < 0 and not line.lstrip().startswith(">>>"):
+            parts = re.split(r"(``.*?``)", line)
+            line = "".join(part if part.startswith("``") else part.replace("|", r"\|") for part in parts)  # noqa: PLW2901
+            if line.rstrip().endswith("::") or line.lstrip().startswith(".. math::"):
+                literal = indent
+        out.append(line)
+    return out
+
+
+def literal_formulas(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Set the indented formulas above the first section of a docstring as they stand."""
+    title = next((i for i, line in enumerate(lines) if re.fullmatch(r"-{3,}", line.strip())), len(lines) + 1) - 1
+    out: list[str] = []
+    for i, line in enumerate(lines):
+        starts = line.startswith("  ") and i < title and i > 0 and not lines[i - 1].strip()
+        previous = next((text for text in reversed(out) if text.strip()), "")
+        if starts and not previous.startswith(("  ", "..", "- ", "* ")) and not previous.endswith("::"):
+            out += ["::", ""]
+        out.append(line)
+    lines[:] = without_bars(out)
+
+
+def fill(app: object, name: str, source: list[str]) -> None:
+    """Put the gallery in its place, and turn links that leave the sources to the pages that hold their target."""
+    if name == "site/gallery":
+        source[0] = source[0].replace("<!-- gallery -->", gallery())
+    for path, page in OUTSIDE.items():
+        source[0] = re.sub(rf"\]\((\.\./)+{re.escape(path)}(#[\w-]*)?\)", rf"](/site/{page}.md\2)", source[0])
+
+
+def setup(app: object) -> None:
+    """Register both with Sphinx."""
+    app.connect("source-read", fill)  # type: ignore[attr-defined]
+    app.connect("autodoc-process-docstring", literal_formulas, priority=100)  # type: ignore[attr-defined]
