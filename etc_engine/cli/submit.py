@@ -22,7 +22,7 @@ EXIT_RESUMABLE = 75
 def submit_command(
     study: Path, server: str, token_file: Path | None, waiting: bool, output: Path | None, as_json: bool
 ) -> int:
-    """Hand in STUDY (a TOML file); prints its identity.
+    """Hand in STUDY (a TOML file); prints its identity alone on stdout, all else on stderr.
 
     The same study again is answered from the result that is there. With --wait the exit status is that of `sweep`: 0
     done, 4 done with failed realizations, 75 ended without a result.
@@ -38,14 +38,16 @@ def submit_command(
         check_place(output, study, replaces_result=True)
     place = connect(server, token_file)
     found = client.submit(place, text)
+    if not as_json:
+        click.echo(found["id"])
+    teller = _Teller()
+    teller.tell(found)
     if waiting or output is not None:
-        found = client.wait(place, found["id"], tell=_Teller().tell)
+        found = client.wait(place, found["id"], tell=teller.tell)
         if found["state"] == "done" and output is not None:
             client.download(place, found["id"], output)
     if as_json:
         print_json(found)
-    else:
-        click.echo(progress_of(found))
     if found["state"] in ("failed", "cancelled") and (waiting or output is not None):
         return EXIT_RESUMABLE
     return EXIT_FAILED_CELLS if found["failed_cells"] else 0

@@ -27,6 +27,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from etc_engine.durable.files import replacing
 from etc_engine.errors import InputError, OutputError
+from etc_engine.service.addresses import is_address
 
 if TYPE_CHECKING:
     import xarray
@@ -51,6 +52,11 @@ class Server:
         Empty where the service asks for none. It travels in the header Authorization: over http anyone on the way
         can read it, so use https beyond this machine.
     timeout : float [s]
+
+    Notes
+    -----
+    The proxy of the environment (``https_proxy``) is used for https and a host with a name only. Over http it could
+    read the token and the study, and an address names the machine to speak to.
     """
 
     url: str
@@ -222,7 +228,8 @@ def _open(
     if server.token:
         headers["Authorization"] = f"Bearer {server.token}"
     request = urllib.request.Request(server.url.rstrip("/") + path, body, headers, method=method)
-    opener = urllib.request.build_opener(_NoRedirect)
+    proxies: dict[str, str] | None = {} if _is_direct(server.url) else None  # None: those of the environment
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler(proxies), _NoRedirect)
     try:
         answer: IO[bytes] = opener.open(request, timeout=timeout or server.timeout)
     except urllib.error.HTTPError as error:
@@ -236,6 +243,18 @@ def _open(
         why = getattr(why, "strerror", None) or why
         raise OutputError(f"{server.url} does not answer ({why}): is the service running there?") from None
     return answer
+
+
+def _is_direct(url: str) -> bool:
+    """Whether a service is asked without a proxy.
+
+    Examples
+    --------
+    >>> _is_direct("http://node7:8765"), _is_direct("https://[::1]:8765"), _is_direct("https://etc.example.org")
+    (True, True, False)
+    """
+    parts = urllib.parse.urlsplit(url)
+    return parts.scheme == "http" or is_address(parts.hostname or "") or parts.hostname == "localhost"
 
 
 def _reason(error: urllib.error.HTTPError) -> str:

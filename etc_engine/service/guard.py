@@ -9,14 +9,14 @@
 from __future__ import annotations
 
 import hmac
-import ipaddress
 import json
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
 from starlette.exceptions import HTTPException
 
-from etc_engine.service.settings import LOOPBACK, Settings
+from etc_engine.service.addresses import LOOPBACK, is_address
+from etc_engine.service.settings import Settings
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -108,7 +108,7 @@ class Guard:
         name = host_name(header)
         if name in {*LOOPBACK, self._settings.host, *self._settings.hosts}:
             return True
-        return bool(self._token) and _is_address(name)  # an address cannot be rebound
+        return bool(self._token) and is_address(name)  # an address cannot be rebound
 
 
 def _unknown(header: str) -> str:
@@ -129,14 +129,6 @@ def host_name(header: str) -> str:
     if header.startswith("["):
         return header[1:].partition("]")[0].lower()
     return header.partition(":")[0].lower()
-
-
-def _is_address(name: str) -> bool:
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
 
 
 def _limited(receive: Receive, limit: int) -> Receive:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import ipaddress
 import logging
 import signal
 import socket
@@ -13,12 +12,13 @@ from types import FrameType
 import uvicorn
 
 from etc_engine.errors import InputError, OutputError
+from etc_engine.service.addresses import is_loopback
 from etc_engine.service.app import Service, make_app
 from etc_engine.service.launchers import check_launcher, make_launcher
 from etc_engine.service.live import LiveResults
 from etc_engine.service.queue import Queue
 from etc_engine.service.running import Runner
-from etc_engine.service.settings import LOOPBACK, Settings
+from etc_engine.service.settings import Settings
 from etc_engine.service.store import open_store
 from etc_engine.service.supervisor import Supervisor
 
@@ -89,17 +89,10 @@ def check_access(settings: Settings) -> None:
     if settings.token:
         return
     keep = "give a token by --token-file or ETC_ENGINE_TOKEN"
-    if not _is_loopback(settings.host):
+    if not is_loopback(settings.host):
         raise InputError(f"host {settings.host} can be reached from other machines: {keep}, or keep to 127.0.0.1")
     if settings.hosts:
         raise InputError(f"the name {settings.hosts[0]} brings requests of other machines here: {keep}")
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host in LOOPBACK
 
 
 def _listen(settings: Settings) -> socket.socket:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-LOOPBACK = ("127.0.0.1", "::1", "localhost")
 DEFAULT_PORT = 8765
 ENGINE = (sys.executable, "-m", "etc_engine")
 """The command line of this very installation."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import socket
 import threading
+from contextlib import suppress
 
 import pytest
 from serving import STUDY, Service, renamed, until
@@ -36,6 +38,44 @@ def test_submit_status_fetch(service, tmp_path, etc_engine):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["again.nc", "out.nc", "study.toml"]
 
 
+def test_submit_prints_the_identity_alone(service, tmp_path, etc_engine):
+    """So that ``ID=$(etc-engine submit study.toml)`` works, with and without waiting."""
+    (tmp_path / "study.toml").write_text(renamed("identity"))
+    study = client.submit(service.server, renamed("identity"))["id"]
+    for more in ([], ["--wait"], ["-o", tmp_path / "out.nc"]):
+        done = etc_engine("submit", tmp_path / "study.toml", "--server", service.url, *more)
+        assert (done.returncode, done.stdout) == (0, f"{study}\n"), done.stderr
+        assert f"{study}  " in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("address", "asked"),
+    [("http://127.0.0.1:9", 0), ("http://etc.invalid", 0), ("https://127.0.0.2:9", 0), ("https://etc.invalid", 1)],
+)
+def test_token_and_study_never_go_to_a_proxy_in_clear(monkeypatch, address, asked):
+    """A proxy of the environment sees a request to a named host over https, as CONNECT, and nothing else."""
+    seen = []
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        listener.settimeout(20)
+
+        def proxy() -> None:
+            with suppress(OSError), listener.accept()[0] as connection:
+                seen.append(connection.recv(65536))
+
+        thread = threading.Thread(target=proxy)
+        thread.start()
+        for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "all_proxy"):
+            monkeypatch.setenv(name, f"http://127.0.0.1:{listener.getsockname()[1]}")
+        for name in ("no_proxy", "NO_PROXY"):
+            monkeypatch.delenv(name, raising=False)
+        with pytest.raises(OutputError, match="does not answer"):
+            client.submit(client.Server(address, TOKEN, timeout=0.5), STUDY)
+        listener.shutdown(socket.SHUT_RDWR)
+        thread.join()
+    assert len(seen) == asked
+    assert all(request.startswith(b"CONNECT ") and TOKEN.encode() not in request for request in seen)
+
+
 def test_cancel_and_resume(tmp_path, etc_engine):
     with Service(tmp_path / "data", {"token": TOKEN}, {"ETC_TEST_SECONDS": "0.5"}, slow=True) as service:
         (tmp_path / "token").write_text(TOKEN + "\n")
@@ -52,7 +92,8 @@ def test_cancel_and_resume(tmp_path, etc_engine):
         assert etc_engine("fetch", study, *server, "-o", tmp_path / "out.nc").returncode == 2
         waited = etc_engine("submit", tmp_path / "study.toml", *server, "--wait")
         assert waited.returncode == 0
-        assert "6/6  served" in waited.stdout
+        assert waited.stdout == f"{study}\n"
+        assert "6/6  served" in waited.stderr
         assert etc_engine("status", study, *server, "--remove").stdout == f"{study}  removed\n"
         assert client.studies(service.server) == []
         assert not (tmp_path / "data" / "studies" / study).exists()
