@@ -1,27 +1,46 @@
 #!/usr/bin/env bash
 #SBATCH --job-name=etc-engine
-#SBATCH --nodes=1
-#SBATCH --ntasks-per-node=32
+#SBATCH --ntasks=32
 #SBATCH --cpus-per-task=1
 #SBATCH --time=04:00:00
 #SBATCH --signal=TERM@120
 #SBATCH --requeue
 #SBATCH --open-mode=append
-# A study as a Slurm job:  sbatch [--nodes=N] jobs/slurm.sh studies/NAME/study.toml out.nc
+# A study as a Slurm job:  sbatch [--ntasks=RANKS] jobs/slurm.sh studies/NAME/study.toml out.nc
 #
-# Two minutes before the time limit every rank gets SIGTERM, keeps what is finished and ends with status 75;
-# the job then queues itself again and continues. A node that fails, or a preemption, does the same.
+# Two minutes before the time limit every rank gets SIGTERM, keeps what is finished and ends with status 75. The
+# job then queues itself again and continues; so it does when ranks were killed. Slurm itself queues it again after
+# the failure of a node and after a preemption.
+#
+# In a job array (sbatch --array=1-8 ...) each job computes its part of the units: see jobs/slurm_array.sh.
 set -uo pipefail
 
 study=${1:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
 output=${2:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
+restart=${SLURM_RESTART_COUNT:-0}
 read -r -a launcher <<<"${ETC_LAUNCHER:-srun --kill-on-bad-exit=1}"
+part=()
+if [ -n "${SLURM_ARRAY_TASK_COUNT:-}" ]; then
+    number=$(((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN) / ${SLURM_ARRAY_TASK_STEP:-1} + 1))
+    part=(--part "$number/$SLURM_ARRAY_TASK_COUNT")
+fi
 
-"${launcher[@]}" etc-engine sweep "$study" -o "$output" --resume
+# Killed ranks leave shared memory that is named after job and step, and MPI_Init of the same step then fails on that
+# node. A requeued job would count its steps from 0 again: use up the numbers of the earlier starts.
+for ((step = 0; step < restart; step++)); do
+    srun --nodes=1 --ntasks=1 true
+done
+
+"${launcher[@]}" etc-engine sweep "$study" -o "$output" --resume "${part[@]}"
 status=$?
 
-if [ "$status" -eq 75 ] && [ "${SLURM_RESTART_COUNT:-0}" -lt "${ETC_MAX_RESTARTS:-50}" ]; then
-    echo "stopped early: queueing job $SLURM_JOB_ID again"
+case $status in
+75) why="stopped early" ;;
+9 | 15 | 12[89] | 1[3-9][0-9]) why="ranks were killed (status $status)" ;; # 128 + signal; mpiexec gives the signal alone
+*) exit "$status" ;;
+esac
+if [ "$restart" -lt "${ETC_MAX_RESTARTS:-50}" ]; then
+    echo "$why: queueing job $SLURM_JOB_ID again"
     scontrol requeue "$SLURM_JOB_ID" && exit 0
 fi
 exit "$status"

@@ -19,6 +19,7 @@ from etc_engine.cli.sweep import launch
 from etc_engine.cli.threads import hold_one_thread
 from etc_engine.errors import EtcError
 from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
+from etc_engine.sweep.parts import Part
 
 
 def realize(
@@ -78,6 +79,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--burn", action="store_true", help="pass the time at work, not asleep")
     parser.add_argument("--log", type=Path, help="write a line for every unit computed")
     parser.add_argument("--trouble", action="store_true", help="some units and cells fail")
+    parser.add_argument("--part", type=lambda text: Part(*map(int, text.split("/"))), help="K/N: this part only")
     parser.add_argument("--file-limit", type=int, help="no file may grow beyond so many bytes, as on a full disk")
     options = parser.parse_args(arguments)
     hold_one_thread()
@@ -87,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         resource.setrlimit(resource.RLIMIT_FSIZE, (options.file_limit, options.file_limit))
     engine = partial(realize, seconds=options.seconds, burn=options.burn, log=options.log, trouble=options.trouble)
     try:
-        return launch(options.study, options.output, options.policy, engine)
+        return launch(options.study, options.output, options.policy, engine, part=options.part)
     except EtcError as error:
         print(f"etc-engine: {error}", file=sys.stderr)
         return 2

@@ -3,20 +3,38 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.durable.stop import signals_held_back
 from etc_engine.errors import EtcError, OutputError
 
 if TYPE_CHECKING:
     from etc_engine.sweep.claim import Policy
+    from etc_engine.sweep.parts import Part
     from etc_engine.sweep.scheduler import Communicator
     from etc_engine.sweep.sweep import Outcome, Realize
 
 EXIT_FAILED_CELLS = 4
 EXIT_RESUMABLE = 75
+
+
+class PartType(click.ParamType):
+    """K/N as a `Part`."""
+
+    name = "K/N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Part:
+        """The part that two numbers name."""
+        from etc_engine.sweep.parts import Part
+
+        number, _, count = str(value).partition("/")
+        if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
+            self.fail(f"found {value!r}, expected K/N with 1 <= K <= N, such as 3/8", param, ctx)
+        return Part(int(number), int(count))
 
 
 @click.command("sweep")
@@ -25,7 +43,8 @@ EXIT_RESUMABLE = 75
 @click.option("--resume", is_flag=True, help="Go on where an earlier run stopped; starts anew if there is none.")
 @click.option("--overwrite", is_flag=True, help="Start anew and replace what is there.")
 @click.option("--dry-run", is_flag=True, help="Print units, time and memory, and what is there; write nothing.")
-def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_run: bool) -> int:
+@click.option("--part", type=PartType(), help="Compute part K of N only; --resume without --part joins all parts.")
+def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_run: bool, part: Part | None) -> int:
     """Run all realizations of STUDY (a TOML file) and write one dataset.
 
     Under mpirun every rank computes; the result has the same bits for any number of ranks. Finished units
@@ -34,6 +53,8 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")
+    if dry_run and part is not None:
+        raise click.UsageError("--dry-run is of the whole study: leave out --part")
     if output.exists() and study.exists() and output.samefile(study):
         raise OutputError(f"the output {output} is the study file itself: choose another name")
     if dry_run:
@@ -41,19 +62,33 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
 
         check_place(output, replaces_result=True)
     policy: Policy = "resume" if resume else "overwrite" if overwrite else "fresh"
-    return launch(study, output, policy, dry_run=dry_run)
+    return launch(study, output, policy, dry_run=dry_run, part=part)
 
 
-def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = None, dry_run: bool = False) -> int:
+def launch(
+    study: Path,
+    output: Path,
+    policy: Policy,
+    realize: Realize | None = None,
+    *,
+    dry_run: bool = False,
+    part: Part | None = None,
+) -> int:
     """Run a sweep on the ranks that were started; returns the exit status. ``realize`` may be a stand-in."""
+    if dry_run:
+        return _connected(lambda communicator, engine: _foretell(study, output, communicator, engine), realize)
+    with signals_held_back():
+        return _connected(lambda communicator, engine: _run(study, output, policy, communicator, engine, part), realize)
+
+
+def _connected(action: Callable[[Communicator, Realize], int], realize: Realize | None) -> int:
+    """The exit status of an action on the ranks that were started; an unexpected error ends all of them."""
     from etc_engine import realization
     from etc_engine.sweep.scheduler import connect
 
     communicator = connect()
     try:
-        if dry_run:
-            return _foretell(study, output, communicator, realize or realization.realize)
-        return _run(study, output, policy, communicator, realize or realization.realize)
+        return action(communicator, realize or realization.realize)
     except EtcError:
         if communicator.rank == 0:
             raise
@@ -66,7 +101,9 @@ def launch(study: Path, output: Path, policy: Policy, realize: Realize | None = 
         communicator.abort(1)
 
 
-def _run(study: Path, output: Path, policy: Policy, communicator: Communicator, realize: Realize) -> int:
+def _run(
+    study: Path, output: Path, policy: Policy, communicator: Communicator, realize: Realize, part: Part | None
+) -> int:
     from etc_engine.cli.progress import Progress
     from etc_engine.sweep.sweep import sweep
 
@@ -80,6 +117,7 @@ def _run(study: Path, output: Path, policy: Policy, communicator: Communicator, 
             realize,
             report=progress.report,
             notify=progress.notify,
+            part=part,
         )
     communicator.close()
     if communicator.rank == 0:
@@ -96,6 +134,12 @@ def _tell(outcome: Outcome, seconds: float, ranks: int) -> None:
             f"etc-engine: stopped early ({outcome.stopped}): {outcome.computed} units finished by this run "
             "are kept, continue with --resume",
             err=True,
+        )
+        return
+    if outcome.part is not None:
+        click.echo(
+            f"{outcome.output}: {outcome.units} units of part {outcome.part} are finished ({outcome.computed} computed "
+            f"now on {ranks} rank{'s' * (ranks > 1)} in {seconds:.1f} s); --resume without --part joins all parts"
         )
         return
     cells = ", ".join(f"{n} {status.name.lower()}" for status, n in outcome.cells.items())

@@ -16,6 +16,7 @@ from etc_engine.durable.lock import Lock
 from etc_engine.durable.provenance import Run, engine_commit, engine_version, this_run
 from etc_engine.errors import OutputError, StudyError
 from etc_engine.study.sweep import Study, read_study
+from etc_engine.sweep.parts import Part, part_folders, take_up
 from etc_engine.sweep.shards import (
     SUFFIX,
     clear_folder,
@@ -25,6 +26,8 @@ from etc_engine.sweep.shards import (
 )
 
 Policy = Literal["fresh", "resume", "overwrite"]
+USELESS_STARTS = 5
+"""After so many starts in a row that finished no unit a batch job ends; its script would queue it again and again."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,17 @@ class Claim:
     run: str
     complete: bool = False
     remarks: tuple[str, ...] = ()
+    part: Part | None = None
 
     @property
     def folder(self) -> Path:
         """Where the shards are."""
-        return shard_folder(self.output)
+        return _folder(self.output, self.part)
 
 
-def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, held: ExitStack) -> Claim:
+def claim_output(
+    study_path: Path, output: Path, policy: Policy, ranks: int, held: ExitStack, part: Part | None = None
+) -> Claim:
     """Check the study, lock the output and prepare its folder of shards.
 
     Parameters
@@ -57,6 +63,8 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
         How many compute, for the record.
     held : ExitStack
         Takes the lock; it is released when the stack is closed.
+    part : Part, optional
+        Compute this part only; the whole takes up the finished units of all parts.
 
     Raises
     ------
@@ -66,31 +74,32 @@ def claim_output(study_path: Path, output: Path, policy: Policy, ranks: int, hel
         If the output exists, is locked or cannot be written.
     """
     study, text = read_study(study_path)
-    folder, run = _make_folder(output), new_run()
+    folder, run = _make_folder(output, part), new_run()
     held.callback(_remove_if_empty, folder)
     lock = held.enter_context(Lock(folder, run))
-    shards = sorted(folder.glob(f"*{SUFFIX}"))
-    if policy == "fresh" and (shards or output.exists()):
-        what = f"finished units of {output}" if shards else f"{output}"
-        raise OutputError(
-            f"{what} exist{'' if shards else 's'}: continue with --resume, or start anew with --overwrite"
-        )
-    if policy == "resume" and not shards and output.exists():
+    parts = [] if part else part_folders(output)
+    started = [place for place in (folder, *parts) if any(place.glob(f"*{SUFFIX}"))]
+    if policy == "fresh" and (started or output.exists()):
+        what = f"finished units of {output} exist" if started else f"{output} exists"
+        raise OutputError(f"{what}: continue with --resume, or start anew with --overwrite")
+    if part and policy == "overwrite" and output.exists():
+        raise OutputError(f"{output} exists and a part does not replace it: remove it first")
+    if policy == "resume" and output.exists() and folder not in started:
         refuse_other_study(study, *_study_of_output(output), str(output))
-        return Claim(study, text, output, run, complete=True)
-    remarks: tuple[str, ...] = ()
-    if policy == "resume" and shards:
-        found = read_study_file(folder)
-        if found is None:
-            raise StudyError(f"{folder} does not say which study its units belong to: start anew with --overwrite")
-        refuse_other_study(study, *found, str(folder))
-        remarks = _other_engines(folder)
-    else:
+        return Claim(study, text, output, run, complete=True, part=part)
+    if policy == "resume":
+        for place in started:
+            _refuse_units_of_another(study, place)
+        _refuse_useless_starts(folder, lock.holder.job)
+    if policy != "resume" or (read_study_file(folder) or ("",))[0] != study.digest():
         clear_folder(folder)
         write_study_file(folder, study.identity(), study.digest())
+    for place in parts:
+        take_up(place, folder if policy == "resume" else None, run)
+    remarks = _other_engines(folder) if policy == "resume" and started else ()
     record = json.dumps(asdict(this_run(run, ranks, lock.holder.job)))
     write_atomically(folder / f"{run}.run", record.encode())
-    return Claim(study, text, output, run, remarks=(*remarks, *study.remarks()))
+    return Claim(study, text, output, run, remarks=(*remarks, *study.remarks()), part=part)
 
 
 def new_run() -> str:
@@ -132,13 +141,39 @@ def _alike(there: Any, here: Any) -> bool:
     return lists and all(isinstance(item, Mapping) for item in (*there, *here))
 
 
-def _make_folder(output: Path) -> Path:
+def _refuse_units_of_another(study: Study, folder: Path) -> None:
+    """Refuse finished units that are of another study than this one, or do not say of which."""
+    found = read_study_file(folder)
+    if found is None:
+        raise StudyError(f"{folder} does not say which study its units belong to: start anew with --overwrite")
+    refuse_other_study(study, *found, str(folder))
+
+
+def _refuse_useless_starts(folder: Path, job: str) -> None:
+    """End the starts of a batch job that finish nothing: a full disk, or units that take longer than the time limit."""
+    useless = 0
+    for run in reversed([one.run for one in recorded_runs(folder) if job and one.job == job]):
+        if any(path.stat().st_size for path in folder.glob(f"{run}-*{SUFFIX}")):
+            break
+        useless += 1
+    if useless >= USELESS_STARTS:
+        raise OutputError(
+            f"the last {useless} starts of this job ({job}) finished no unit: find out why (full disk, time limit "
+            "shorter than a unit), then hand the study in again to continue"
+        )
+
+
+def _folder(output: Path, part: Part | None) -> Path:
+    return part.folder(output) if part else shard_folder(output)
+
+
+def _make_folder(output: Path, part: Part | None) -> Path:
     """The folder of the shards, made if it is not there."""
     if output.is_dir():
         raise OutputError(f"output {output} is a folder: expected the name of a netCDF file to write")
     if not output.parent.is_dir():
         raise OutputError(f"output {output}: there is no folder {output.parent}, make it first")
-    folder = shard_folder(output)
+    folder = _folder(output, part)
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:

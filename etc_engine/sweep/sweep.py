@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Ints
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.durable.watch import Watch
 from etc_engine.errors import OutputError
@@ -29,6 +30,7 @@ from etc_engine.sweep.attributes import global_attributes
 from etc_engine.sweep.claim import Claim, Policy, claim_output, recorded_runs
 from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.gathering import Gatherer
+from etc_engine.sweep.parts import Part
 from etc_engine.sweep.plan import Unit, next_targets, unit_rng, units_to_run
 from etc_engine.sweep.records import Record, failed_realization
 from etc_engine.sweep.result_file import open_dataset, write_dataset
@@ -51,13 +53,17 @@ NEXT, DONE, FAILED = 0, 1, 2
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a sweep ended. ``cells`` counts the statuses; ``stopped`` is the reason of an early end."""
+    """How a sweep ended. ``cells`` counts the statuses; ``stopped`` is the reason of an early end.
+
+    Of a ``part`` there is no output yet: its ``units`` are finished, and the whole takes them up.
+    """
 
     output: Path
     units: int
     computed: int
     cells: Mapping[Status, int] = field(default_factory=dict)
     stopped: str = ""
+    part: Part | None = None
 
     @property
     def failed(self) -> int:
@@ -78,6 +84,7 @@ def sweep(
     *,
     report: Report = _silent,
     notify: Notify = _silent,
+    part: Part | None = None,
 ) -> Outcome:
     """Run a study on all ranks of a communicator and write its dataset.
 
@@ -93,6 +100,8 @@ def sweep(
         (spec, rng) -> Realization, :func:`etc_engine.realization.realize` or a stand-in.
     report, notify : callable
         Progress and remarks, called on rank 0 only.
+    part : Part, optional
+        Compute this part of the units only, and leave them for a sweep of the whole study.
 
     Returns
     -------
@@ -107,7 +116,9 @@ def sweep(
         If the output exists, is locked or cannot be written. Every rank raises the same error.
     """
     with StopRequest() as stop, ExitStack() as held:
-        claim = on_rank_zero(communicator, partial(claim_output, study_path, output, policy, communicator.size, held))
+        claim = on_rank_zero(
+            communicator, partial(claim_output, study_path, output, policy, communicator.size, held, part)
+        )
         if claim.complete:
             return on_rank_zero(communicator, partial(_outcome_of_file, claim))
         with Watch(claim.folder / "lock", claim.run, launched=communicator.size > 1):
@@ -115,6 +126,8 @@ def sweep(
         communicator.wait_for_all(_silent)  # nobody watches the lock any more, rank 0 may give it back
         if stopped:
             return Outcome(output, 0, computed, stopped=stopped)
+        if part is not None:
+            return Outcome(output, communicator.broadcast(len(table.rows)), computed, part=part)
         return on_rank_zero(communicator, partial(_finish, claim, table, computed))
 
 
@@ -181,15 +194,21 @@ def _plan_round(claim: Claim, table: Table, targets: tuple[int, ...], computed: 
     Rounds that the shards hold already are decided again from the same units, as if they ran now.
     """
     study = claim.study
-    units = units_to_run(study.densities, targets, table.units)
+    units = _units_to_run(claim, targets, table.units)
     while not units.size:
         grown = next_targets(study, targets, table)
         if grown == targets:
             break
         targets = grown
-        units = units_to_run(study.densities, targets, table.units)
-    planned = sum(targets)
+        units = _units_to_run(claim, targets, table.units)
+    planned = len(_units_to_run(claim, targets, np.empty((0, 2), np.int64)))
     return _Plan(targets, units, planned - len(units) - computed, planned)
+
+
+def _units_to_run(claim: Claim, targets: tuple[int, ...], finished: Ints) -> Ints:
+    """The units of the whole study, or of the claimed part, that are not finished."""
+    units = units_to_run(claim.study.densities, targets, finished)
+    return claim.part.select(claim.study, units) if claim.part else units
 
 
 def _run_round(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:

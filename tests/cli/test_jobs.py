@@ -36,7 +36,8 @@ def site(tmp_path):
     (tmp_path / "study.toml").write_text(STUDY)
     programs = tmp_path / "bin"
     programs.mkdir()
-    launcher = 'echo "$(basename "$0") $*" >> "$CALLS"\nwhile [ "$1" != etc-engine ]; do shift; done\nexec "$@"\n'
+    words = 'while [ "$1" != etc-engine ] && [ "$1" != true ]; do shift; done\nexec "$@"\n'
+    launcher = f'echo "$(basename "$0") $*" >> "$CALLS"\n{words}'
     queue = 'echo "$(basename "$0") $*" >> "$CALLS"\n'
     engine = f'[ -n "${{STATUS:-}}" ] && exit "$STATUS"\nexec {sys.executable} -m etc_engine "$@"\n'
     for name in ("mpirun", "mpiexec", "srun"):
@@ -80,6 +81,17 @@ PBS = {"STUDY": "study.toml", "OUTPUT": "out.nc"}
         ("local.sh", ("study.toml", "out.nc", "3"), {}, f"mpirun -n 3 {SWEEP}"),
         ("slurm.sh", ("study.toml", "out.nc"), {}, f"srun --kill-on-bad-exit=1 {SWEEP}"),
         ("pbs.sh", (), PBS, f"mpiexec {SWEEP}"),
+        (
+            "slurm.sh",
+            ("study.toml", "out.nc"),
+            {
+                "SLURM_ARRAY_TASK_ID": "7",
+                "SLURM_ARRAY_TASK_MIN": "5",
+                "SLURM_ARRAY_TASK_STEP": "2",
+                "SLURM_ARRAY_TASK_COUNT": "3",
+            },
+            f"srun --kill-on-bad-exit=1 {SWEEP} --part 2/3",
+        ),
         ("slurm.sh", ("study.toml", "out.nc"), {"ETC_LAUNCHER": "mpirun -n 2"}, f"mpirun -n 2 {SWEEP}"),
     ],
 )
@@ -87,7 +99,8 @@ def test_a_script_runs_the_sweep_through_its_launcher(site, script, arguments, v
     status, calls, output = run(site, script, *arguments, **variables)
     assert status == 0, output
     assert calls == [call]
-    assert open_dataset(site / "out.nc").sizes["realization"] == 2
+    if "--part" not in call:
+        assert open_dataset(site / "out.nc").sizes["realization"] == 2
 
 
 @pytest.mark.parametrize(
@@ -106,7 +119,7 @@ def test_status_75_queues_the_job_again_and_no_other_status_does(site, script, a
     status, calls, output = run(site, script, *arguments, STATUS="75", **variables)
     assert status == 0, output
     assert calls[1:] == [queued]
-    for other in ("0", "2", "4", "1"):
+    for other in ("0", "2", "4", "1", "3", "126", "127"):
         status, calls, _ = run(site, script, *arguments, STATUS=other, **variables)
         assert status == int(other)
         assert len(calls) == 1
@@ -122,7 +135,22 @@ def test_status_75_queues_the_job_again_and_no_other_status_does(site, script, a
 def test_restarts_have_an_end(site, script, arguments, variables):
     status, calls, _ = run(site, script, *arguments, STATUS="75", **variables)
     assert status == 75
-    assert len(calls) == 1
+    assert not [call for call in calls if call.startswith(("scontrol", "qsub"))]
+    assert len([call for call in calls if call.endswith("--resume")]) == 1
+
+
+@pytest.mark.parametrize("status", ["9", "15", "137", "139", "143"])
+def test_killed_ranks_queue_a_slurm_job_again(site, status):
+    ended, calls, output = run(site, "slurm.sh", "study.toml", "out.nc", STATUS=status, SLURM_JOB_ID="17")
+    assert (ended, calls[1:]) == (0, ["scontrol requeue 17"]), output
+    assert f"ranks were killed (status {status})" in output
+
+
+def test_a_requeued_slurm_job_uses_up_the_numbers_of_earlier_steps(site):
+    """MPI names shared memory after job and step: a step of the same number finds what killed ranks have left."""
+    status, calls, output = run(site, "slurm.sh", "study.toml", "out.nc", SLURM_RESTART_COUNT="2")
+    assert status == 0, output
+    assert calls == ["srun --nodes=1 --ntasks=1 true"] * 2 + [f"srun --kill-on-bad-exit=1 {SWEEP}"]
 
 
 def test_the_time_limit_of_pbs_reaches_the_sweep_as_a_warning(site):

@@ -18,6 +18,7 @@ from etc_engine.cli import run
 from etc_engine.cli.sweep import launch
 from etc_engine.cli.threads import hold_one_thread
 from etc_engine.errors import EtcError
+from etc_engine.sweep.parts import Part
 
 
 def main() -> int:
@@ -28,7 +29,8 @@ def main() -> int:
     seconds = float(os.environ.get("ETC_TEST_SECONDS", "0"))
     engine = partial(realize, seconds=seconds, log=Path(log) if log else None)
     try:
-        return launch(Path(sys.argv[2]), Path(sys.argv[4]), "resume", engine)
+        part = Part(*map(int, sys.argv[-1].split("/"))) if sys.argv[-2] == "--part" else None
+        return launch(Path(sys.argv[2]), Path(sys.argv[4]), "resume", engine, part=part)
     except EtcError as error:
         print(f"etc-engine: {error}", file=sys.stderr)
         return 2

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from etc_engine.durable.stop import Stopped, StopRequest
+from etc_engine.durable.stop import Stopped, StopRequest, signals_held_back
 
 
 def swallows() -> str:
@@ -49,3 +49,12 @@ def test_between_units_a_signal_is_noted():
         os.kill(os.getpid(), signal.SIGTERM)
         with pytest.raises(Stopped):
             stop.run(lambda: 8)
+
+
+def test_a_signal_before_anybody_listens_stops_the_first_unit():
+    with signals_held_back():
+        os.kill(os.getpid(), signal.SIGTERM)  # would end this process
+        with StopRequest() as stop, pytest.raises(Stopped):
+            stop.run(lambda: "begun")
+        assert stop.reason == "SIGTERM"
+    assert signal.SIGTERM not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
