@@ -84,7 +84,7 @@ def made_sweep():
             return Outcome(Status.PACKING_FAILED, "made to fail")
         tensor = np.full((dimension, dimension), np.nan)
         np.fill_diagonal(tensor, value)
-        status = Status.OK if tensor[0, 0] > 0.0 else Status.NOT_PERCOLATING
+        status = Status.OK if np.nanmax(tensor) > 0.0 else Status.NOT_PERCOLATING
         return Outcome(status, "", tensor, 30, 4, 3.5, 20, 6, 1e-11, 0.001, mean_field)
 
     def build(text: str, conduct, solid=lambda density: density, mean_field: float = 0.5):

@@ -41,7 +41,8 @@ OPTIONS = (
     click.option("--emissivity", type=float, help="Emissivity of the particles: facing surfaces radiate."),
     click.option(
         "--wall-temperatures",
-        help="Temperatures of the walls at the low and the far end [K], 900:600: properties follow the local one.",
+        help="Temperatures of the walls at the low and the far end [K], 900:600: properties follow the local "
+        "one, along every walled axis asked for.",
     ),
 )
 
@@ -106,29 +107,46 @@ class PhysicsWords:
         given = self.gas, self.pressure, self.accommodation, self._atomic_mass(), self.emissivity
         return Conditions(self.reference, *given)
 
-    def between_walls(self, medium: Medium, axis: int) -> dict[str, Any]:
+    def between_walls(self, medium: Medium, axes: tuple[int, ...]) -> dict[str, Any]:
         """Record of the conduction between the walls at the local temperature; empty without their temperatures.
+
+        Parameters
+        ----------
+        medium : Medium
+        axes : tuple of int
+            Load axes; those without walls are left out. ``heat_flow`` is along the first one.
 
         Raises
         ------
         InputError
-            If nothing follows the temperature.
+            If nothing follows the temperature, or no axis has walls.
         """
         if self.walls is None:
             return {}
-        from etc_engine.engines.dtem.between_walls import solve_between_walls
+        from dataclasses import replace
+
+        import numpy as np
+
+        from etc_engine.box import AXES
+        from etc_engine.engines.dtem.between_walls import conductivity_between_walls
         from etc_engine.errors import InputError
         from etc_engine.materials import find_solid
+        from etc_engine.medium.local import LocalProperties, solid_law
 
         if self.material is None and self.gas is None and not self.emissivity:
             raise InputError("--wall-temperatures need --material, --gas or --emissivity: nothing else follows them")
-        solid = None if self.material is None else find_solid(self.material).conductivity.at
-        found = solve_between_walls(medium, axis, self.walls, self.conditions, solid)
+        every = np.ones(medium.packing.count, dtype=np.bool_)
+        named = () if self.material is None else ((every, find_solid(self.material).conductivity),)
+        solid = solid_law(medium.conductivity, named)
+        local = LocalProperties(medium.packing, self.conditions, solid, medium.pores.conductivity, self.walls)
+        result, by_axis = conductivity_between_walls(replace(medium, local=local), axes=axes)
+        first = by_axis[min(by_axis)]
         return {
-            "conductivity_between_walls": found.conductivity,
-            "heat_flow": found.heat_flow,
-            "heat_imbalance": found.imbalance,
-            "nonlinear_iterations": found.iterations,
+            "conductivity_between_walls": first.conductivity,
+            "conductivity_between_walls_per_axis": {AXES[axis]: one.conductivity for axis, one in by_axis.items()},
+            "heat_flow": first.heat_flow,
+            "heat_imbalance": result.heat_imbalance,
+            "nonlinear_iterations": result.picard_iterations,
         }
 
     @property

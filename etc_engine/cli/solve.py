@@ -188,7 +188,7 @@ def _print_table(record: dict[str, Any]) -> None:
             continue
         if name == "conductivity_tensor":
             text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
-        elif name == "conductivity_per_axis":
+        elif name.endswith("_per_axis"):
             text = ", ".join(f"{axis} {k:.8g}" for axis, k in value.items())
         elif name == "conductivity_bounds":
             text = " to ".join(f"{k:.8g}" for k in value)

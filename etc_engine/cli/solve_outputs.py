@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from etc_engine.medium.field import ParticleField
     from etc_engine.particle_files.table import ParticleTable
 
+PER_AXIS = ("conductivity", "conductivity_between_walls")
+"""Values of a record that stand in it by axis."""
+
 
 @dataclass(frozen=True)
 class SolveOutputs:
@@ -51,7 +54,8 @@ def write_outputs(outputs: SolveOutputs, field: ParticleField, record: dict[str,
             from etc_engine.particle_files.netcdf import with_ids
 
             plain = {key: value for key, value in record.items() if key != "contact_temperatures"}
-            plain |= {f"conductivity_{axis}": k for axis, k in plain.pop("conductivity_per_axis").items()}
+            for name in PER_AXIS:
+                plain |= {f"{name}_{axis}": k for axis, k in plain.pop(f"{name}_per_axis", {}).items()}
             plain["percolates"] = int(plain["percolates"])
             plain["conductivity_units"] = "W m-1 K-1"
             plain["source"] = f"etc_engine {engine_version()}"

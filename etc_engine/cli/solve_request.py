@@ -135,9 +135,9 @@ class SolveRequest:
 
         if self.physics.walls is None:
             return {}
-        if method != "facets" or len(axes) != 1:
-            raise InputError("--wall-temperatures take method facets and one --axis")
-        return self.physics.between_walls(medium, axes[0])
+        if method != "facets":
+            raise InputError(f"--wall-temperatures take method facets, found {method}: spheres whose pores conduct")
+        return self.physics.between_walls(medium, axes)
 
 
 def load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:

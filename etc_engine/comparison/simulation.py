@@ -111,6 +111,8 @@ def phases(dataset: xarray.Dataset) -> Phases:
             )
     glow = bool((dataset.coords.get("emissivity", pores * 0.0) > 0.0).any())
     unbound = _unbound(study["contacts"].get("rule", "overlap"), gas="pressure" in dataset.coords, glow=glow)
+    if not unbound and study["conduction"].get("nonlinear"):
+        unbound = "the conductivities follow the temperature between the walls"
     return Phases(pores, particles, dataset.sizes["direction_i"], unbound)
 
 
@@ -150,18 +152,24 @@ def in_words(values: Any) -> str:
 def mean_diagonal(tensor: xarray.DataArray) -> xarray.DataArray:
     """Mean of the diagonal of a conductivity tensor, k = (k_xx + k_yy)/2 in the plane.
 
+    Axes without a conductivity stay out: those without walls, where properties follow the temperature between walls.
+
     Examples
     --------
     >>> import xarray
     >>> axes = {"direction_i": ["x", "y"], "direction_j": ["x", "y"]}
     >>> float(mean_diagonal(xarray.DataArray([[1.0, np.nan], [np.nan, 3.0]], coords=axes)))
     2.0
+    >>> float(mean_diagonal(xarray.DataArray([[np.nan, np.nan], [np.nan, 3.0]], coords=axes)))
+    3.0
     """
+    import xarray
+
     diagonal = [tensor.isel(direction_i=i, direction_j=i, drop=True) for i in range(tensor.sizes["direction_i"])]
-    total = diagonal[0]
-    for component in diagonal[1:]:
-        total = total + component
-    return total / len(diagonal)
+    total, count = xarray.zeros_like(diagonal[0]), xarray.zeros_like(diagonal[0])
+    for component in diagonal:
+        total, count = total + component.fillna(0.0), count + component.notnull()
+    return total / count.where(count > 0.0)
 
 
 def simulated(dataset: xarray.Dataset) -> xarray.Dataset:

@@ -10,7 +10,7 @@ import numpy as np
 from etc_engine.errors import InputError
 from etc_engine.laws.radiation import grey_exchange
 from etc_engine.materials import accommodation_from_masses, gas_state, jump_length, pore_conductivity
-from etc_engine.medium.medium import Pores
+from etc_engine.medium.pores import Pores
 from etc_engine.packing.particles import ParticlePacking
 
 

@@ -73,6 +73,11 @@ class EffectiveConductivity(Generic[Solution]):
     certified : bool
         Whether the error of a reduced solution is a proven bound.
     seconds : float
+    heat_imbalance : float
+        Largest difference of the heat in at one wall and out at the other, over the heat flow, where properties follow
+        the local temperature; NaN elsewhere.
+    picard_iterations : int
+        Largest number of linear problems of an axis there, 0 elsewhere.
     """
 
     tensor: Floats
@@ -87,6 +92,8 @@ class EffectiveConductivity(Generic[Solution]):
     snapshots: int = 0
     certified: bool = False
     seconds: float = 0.0
+    heat_imbalance: float = np.nan
+    picard_iterations: int = 0
 
     @property
     def missing_axes(self) -> str:

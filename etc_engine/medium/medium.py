@@ -11,69 +11,13 @@ from numpy.typing import ArrayLike
 from etc_engine.arrays import Floats
 from etc_engine.box import Box
 from etc_engine.errors import InputError
+from etc_engine.medium.local import LocalProperties
 from etc_engine.medium.network import LARGEST, ContactNetwork
+from etc_engine.medium.pores import VACUUM, Pores
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.union import solid_fraction
 
-
-@dataclass(frozen=True)
-class Pores:
-    """What fills the space between the particles: a fluid at rest, or the matrix of a composite.
-
-    Parameters
-    ----------
-    conductivity : float [W/(m K)]
-        Of the continuum fluid; finite and not negative, 0 for a vacuum.
-    heat_capacity : float [J/(m3 K)]
-        rho c, not negative.
-    jump_length : float [m]
-        Temperature jump length of a gap, both surfaces together; 0 for a continuum.
-    radiation : float [W/(m2 K)]
-        Radiative conductance per area of facing surfaces.
-    open_conductivity : float, optional [W/(m K)]
-        Of the fluid in the open pore, at most `conductivity`; smaller where the gas is rarefied. That of the
-        continuum if left out.
-
-    Raises
-    ------
-    InputError
-    """
-
-    conductivity: float = 0.0
-    heat_capacity: float = 0.0
-    jump_length: float = 0.0
-    radiation: float = 0.0
-    open_conductivity: float | None = None
-
-    def __post_init__(self) -> None:
-        values = {
-            "conductivity": self.conductivity,
-            "heat capacity": self.heat_capacity,
-            "jump length": self.jump_length,
-            "radiation": self.radiation,
-            "open conductivity": self.in_open_pores,
-        }
-        for name, value in values.items():
-            if not (np.isfinite(value) and value >= 0.0):
-                raise InputError(f"the {name} of the pores must be finite and not negative, found {value:g}")
-
-    @property
-    def in_open_pores(self) -> float:
-        """Conductivity of the fluid in the open pore [W/(m K)]."""
-        return self.conductivity if self.open_conductivity is None else self.open_conductivity
-
-    @property
-    def conduct(self) -> bool:
-        """Whether heat passes through the pores."""
-        return self.conductivity > 0.0 or self.radiation > 0.0
-
-    @property
-    def plain(self) -> bool:
-        """Whether they are a continuum of one conductivity, without temperature jumps and radiation."""
-        return self.jump_length == 0.0 and self.radiation == 0.0 and self.in_open_pores == self.conductivity
-
-
-VACUUM = Pores()
+__all__ = ["VACUUM", "Medium", "Pores", "check_conductors", "medium_of", "per_particle"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +34,8 @@ class Medium:
     pores : Pores
     heat_capacity : float or ndarray, shape (n,), optional [J/(m3 K)]
         rho c of all particles, or of each, for a transient. Kept as an array.
+    local : LocalProperties, optional
+        Conductivities over the temperature, where they follow the local one; those above are at one temperature.
 
     Raises
     ------
@@ -108,6 +54,7 @@ class Medium:
     network: ContactNetwork | None = None
     pores: Pores = VACUUM
     heat_capacity: Floats | None = None
+    local: LocalProperties | None = None
 
     def __post_init__(self) -> None:
         n = self.packing.count

@@ -102,7 +102,7 @@ def _attributes(transient: Transient, text: str) -> dict[str, Any]:
         "study_resolved": json.dumps(study.resolved()),
         "study_digest": study.digest(),
         "engine": study.conduction.engine,
-        "method": study.conduction.method_for(box.dimension, study.pores.conductivity > 0.0),
+        "method": study.conduction.method_for(box.dimension, study.pores_conduct),
         "scheme": study.time.scheme,
         "box": list(box.lengths),
         "periodic": box.periodic_axes,

@@ -41,6 +41,8 @@ class Method:
         Options of the engine that it heeds.
     gas : bool
         Whether it takes rarefied gas and radiation between the particles.
+    local : bool
+        Whether properties may follow the local temperature.
     """
 
     description: str
@@ -50,6 +52,7 @@ class Method:
     transient: bool = False
     options: tuple[str, ...] = ()
     gas: bool = False
+    local: bool = False
 
 
 @dataclass(frozen=True)
@@ -167,6 +170,12 @@ class Engine:
             raise InputError(
                 f"method {method} of engine {self.name} takes neither the temperature jumps of a rarefied gas nor "
                 f"radiation: {cure}"
+            )
+        if medium.local is not None and not row.local:
+            able = [name for name, other in self.methods.items() if other.local]
+            cure = f"use {' or '.join(able)}" if able else "use another engine, or properties at one temperature"
+            raise InputError(
+                f"method {method} of engine {self.name} takes no properties at the local temperature: {cure}"
             )
         if row.pores == MUST and not medium.pores.conduct:
             raise InputError(f"method {method} of engine {self.name} is only valid with pores that conduct")

@@ -91,6 +91,7 @@ ENGINES: Mapping[str, Engine] = {
                     transient=True,
                     options=("dipoles", "material_curve"),
                     gas=True,
+                    local=True,
                 ),
                 "cell": Method(
                     "Laguerre cells: disks or spheres and the fluid between them (insulating pores of disks: chord)",

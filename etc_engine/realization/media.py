@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.laws.roughness import Roughness
 from etc_engine.materials import find_solid
 from etc_engine.medium.conditions import Conditions, pores_at
 from etc_engine.medium.loaded import Stiffness, with_roughness
+from etc_engine.medium.local import LocalProperties, solid_law
 from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import find_rule
@@ -56,8 +58,32 @@ def make_media(
         pores = pores_at(conditions_of(spec, values), packing, values.get("pore_conductivity", 0.0))
         if network is not None and "roughness_height" in values:
             network = _roughened(network, values, conductivity, pores)
-        media.append(Medium(packing, conductivity, network, pores))
+        local = _local(table, spec, values, order, conductivity) if spec.nonlinear else None
+        media.append(Medium(packing, conductivity, network, pores, local=local))
     return media
+
+
+def _local(
+    table: ParticleTable, spec: RealizationSpec, values: Values, order: Ints | None, conductivity: Floats
+) -> LocalProperties:
+    """Properties over the temperature, and the temperatures of the walls."""
+    middle, half = values["temperature"], 0.5 * values["temperature_difference"]
+    materials = []
+    if spec.types is not None and table.types is not None:
+        named = {word: value for word, value in spec.types.items() if isinstance(value, str)}
+        materials = [(table.types == word, find_solid(value).conductivity) for word, value in named.items()]
+    elif spec.material is not None:
+        rows = np.ones(table.packing.count, dtype=np.bool_)
+        if order is not None:
+            rows[order[: round(values["mixture_fraction"] * rows.size)]] = False
+        materials = [(rows, find_solid(spec.material).conductivity)]
+    return LocalProperties(
+        table.packing,
+        conditions_of(spec, values),
+        solid_law(conductivity, materials),
+        values.get("pore_conductivity", 0.0),
+        (middle + half, middle - half),
+    )
 
 
 def solid_conductivity(material: str | Mapping[str, Any], values: Values) -> float:

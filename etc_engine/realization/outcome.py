@@ -35,7 +35,8 @@ class Outcome:
     what the method is estimated to miss, where it has an estimate: ``chord`` solved in full, ``exact`` by its bounds.
     ``solved_by`` is ``full``, or ``reduced`` where the conductivity comes from the solutions at other
     contact angles, ``snapshots`` of them. ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each
-    axis, of method ``exact`` only.
+    axis, of method ``exact`` only. ``heat_imbalance`` is the difference of the heat in at one wall and out at the other
+    over the heat flow, where properties follow the local temperature.
     """
 
     status: Status
@@ -53,6 +54,7 @@ class Outcome:
     solved_by: str = ""
     snapshots: int = 0
     conductivity_bounds: tuple[tuple[float, float], ...] = ()
+    heat_imbalance: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -93,5 +95,6 @@ def outcome_of(medium: Medium, result: Result) -> Outcome:
         model_error_estimate=result.model_error,
         solved_by="reduced" if result.snapshots else "full",
         snapshots=result.snapshots,
+        heat_imbalance=result.heat_imbalance,
         conductivity_bounds=() if result.bounds is None else tuple((float(k), float(m)) for k, m in result.bounds),
     )

@@ -34,6 +34,10 @@ class RealizationSpec:
         What fills the pores, by name or mole fractions, see `etc_engine.materials.gas_state`.
     types : mapping of str to float or str, optional
         Of packings in files: conductivity [W/(m K)] or material by type of particle.
+    nonlinear : bool
+        Whether solid, gas and radiation follow the temperature from one wall to the other:
+        ``temperature + temperature_difference/2`` at the low end, ``temperature - temperature_difference/2`` at the far
+        end.
     """
 
     packing: PackingSpec | PackingSource
@@ -44,6 +48,7 @@ class RealizationSpec:
     material: str | Mapping[str, Any] | None = None
     gas: str | Mapping[str, float] | None = None
     types: Mapping[str, float | str] | None = None
+    nonlinear: bool = False
 
     @property
     def shape(self) -> tuple[int, ...]:

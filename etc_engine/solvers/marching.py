@@ -22,9 +22,9 @@ from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.solvers import time_steps
 from etc_engine.solvers.amg_cg import EXACT_LEVEL
 from etc_engine.solvers.step_matrix import StepMatrix, step_matrix
-from etc_engine.solvers.time_steps import AlgebraicRows, HeatSystem, Step, algebraic_rows
+from etc_engine.solvers.time_steps import NONLINEAR, AlgebraicRows, HeatSystem, Step, algebraic_rows
 
-__all__ = ["SCHEMES", "HeatSystem", "MarchState", "critical_step", "gershgorin_step", "march"]
+__all__ = ["NONLINEAR", "SCHEMES", "HeatSystem", "MarchState", "critical_step", "gershgorin_step", "march"]
 
 SCHEMES = ("explicit-euler", "backward-euler", "crank-nicolson", "bdf2", "adaptive")
 
@@ -147,6 +147,9 @@ def march(
         excite and the scheme would let alternate.
     ``bdf2``
         Order 2, L-stable, of constant step; begun by `time_steps.sdirk2` wherever the step changes.
+    A system whose conductance follows the temperature (`HeatSystem.at`)
+        ``backward-euler`` and ``bdf2``, each step by Picard iteration until no temperature changes by 1e-6 K; ``bdf2``
+        is begun by backward Euler then.
     ``adaptive``
         `time_steps.tr_bdf2`, order 2, L-stable; the step is the output interval halved k times, so that few matrices
         are needed.
@@ -161,11 +164,12 @@ def march(
     """
     times = _checked(system, initial, times, scheme, step, steps, tolerance, restart)
     start = np.asarray(initial, dtype=np.float64)
-    algebraic = algebraic_rows(system, solver_tolerance)
-    fitted = algebraic.fit(system, times[0], start)
+    first = system if system.at is None else system.at(times[0], start)
+    algebraic = algebraic_rows(first, solver_tolerance)
+    fitted = algebraic.fit(first, times[0], start)
     run = _Run(system, scheme, fitted, algebraic, solver_tolerance, tolerance, exact_level, progress, OrderedDict())
     if restart is None:
-        none = np.zeros_like(system.rates(times[0], fitted))
+        none = np.zeros_like(first.rates(times[0], fitted))
         state = MarchState(times[0], fitted, none, 0.0, 0, 0, 0.0, fitted, none)
         yield state
     else:
@@ -247,10 +251,11 @@ def _divide(run: _Run, state: MarchState, low: float, high: float, count: int) -
     h = _rounded((high - low) / count)
     if run.scheme == "explicit-euler":
         _refuse_beyond_critical(run.system, h)
+    step = _step if run.system.at is None else _follow
     for k in range(count):
         t = low + k * (high - low) / count
         end = high if k == count - 1 else low + (k + 1) * (high - low) / count
-        state = run.advance(state, end, h, _step(run, state, t, h))
+        state = run.advance(state, end, h, step(run, state, t, h))
     return state
 
 
@@ -274,6 +279,21 @@ def _step(run: _Run, state: MarchState, t: float, h: float) -> Step:
         system.conductance, system.capacity, 1.0 / (time_steps.SDIRK_GAMMA * h), run.solver_tolerance, matrix
     )
     return time_steps.sdirk2(system, starter, t, h, old)
+
+
+def _follow(run: _Run, state: MarchState, t: float, h: float) -> Step:
+    """One step of a system whose conductance follows the temperature; the first of a length is backward Euler."""
+    again = state.step == h
+    older = state.older if again and run.scheme == "bdf2" else None
+    guess = 2.0 * state.temperatures - state.older if again else state.temperatures
+    return time_steps.nonlinear_step(
+        run.system,
+        (t, h),
+        (state.temperatures, older, state.last_heat),
+        guess,
+        solver_tolerance=run.solver_tolerance,
+        exact_level=run.exact_level,
+    )
 
 
 def _adapt(run: _Run, state: MarchState, low: float, high: float, first: float | None) -> MarchState:
@@ -400,6 +420,10 @@ def _checked(
     """The output times as floats, all arguments refused that `march` cannot work with."""
     if scheme not in SCHEMES:
         raise InputError(f"unknown scheme {scheme!r}: expected one of {', '.join(SCHEMES)}")
+    if system.at is not None and scheme not in NONLINEAR:
+        raise InputError(
+            f"conductances that follow the temperature take the scheme {' or '.join(NONLINEAR)}, found {scheme!r}"
+        )
     instants = [float(t) for t in times]
     if len(instants) < 2 or not np.isfinite(instants).all() or not (np.diff(instants) > 0.0).all():
         raise InputError(f"at least two finite, increasing output times are needed, found {instants[:8]}")

@@ -7,15 +7,21 @@ stores what its own quadrature of 1 . (f - K T) gives; so does any set of heat f
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from etc_engine.arrays import Flags, Floats, Ints
-from etc_engine.errors import InputError
+from etc_engine.errors import ConvergenceError, InputError
+from etc_engine.solvers.amg_cg import EXACT_LEVEL
 from etc_engine.solvers.step_matrix import StepMatrix, step_matrix
 
+# schemes of one implicit stage, which take a conductance that follows the temperature
+NONLINEAR = ("backward-euler", "bdf2")
+# largest change of a temperature in the last iteration of such a step [K]
+PICARD = 1e-6
+MOST_PICARD = 60
 # stages of the two L-stable one-step schemes of order 2
 SDIRK_GAMMA = 1.0 - np.sqrt(0.5)
 TR_BDF2_GAMMA = 2.0 - np.sqrt(2.0)
@@ -47,6 +53,9 @@ class HeatSystem:
         Schemes of order 1 take it in the middle of a step, so that they too integrate exactly what is linear in time.
     knots : tuple of float [s]
         Times at which f has a kink or jumps: no step reaches across one.
+    at : callable, optional
+        (t, T) -> the system with K, f and the heat rates of these temperatures, of the same capacity and nodes. K and f
+        above then belong to one temperature, and only schemes of `NONLINEAR` march the system.
 
     Raises
     ------
@@ -60,6 +69,7 @@ class HeatSystem:
     heat_rates: Callable[[float, Floats], Floats] | None = None
     source: Callable[[float], Floats] | None = None
     knots: tuple[float, ...] = ()
+    at: Callable[[float, Floats], HeatSystem] | None = None
 
     def __post_init__(self) -> None:
         n = self.capacity.size
@@ -82,7 +92,9 @@ class HeatSystem:
         return np.where(self.stores, self.load(t) - self.conductance @ temperatures, 0.0)
 
     def rates(self, t: float, temperatures: Floats) -> Floats:
-        """Heat flows into the system [W]."""
+        """Heat flows into the system [W], at its local properties where they follow the temperature."""
+        if self.at is not None:
+            return self.at(t, temperatures).rates(t, temperatures)
         if self.heat_rates is None:
             return np.array([(self.load(t) - self.conductance @ temperatures).sum()])
         return np.asarray(self.heat_rates(t, temperatures), dtype=np.float64)
@@ -242,3 +254,56 @@ def tr_bdf2(system: HeatSystem, matrix: StepMatrix, t: float, h: float, old: Flo
     error, third = matrix.solve(difference, np.zeros_like(old))
     heat = h * (w * (system.rates(t, old) + system.rates(middle, inner)) + d * system.rates(t + h, new))
     return Step(new, heat, first + second + third, float(np.abs(error).max(initial=0.0)))
+
+
+def nonlinear_step(
+    system: HeatSystem,
+    span: tuple[float, float],
+    before: tuple[Floats, Floats | None, Floats],
+    guess: Floats,
+    *,
+    solver_tolerance: float,
+    exact_level: int = EXACT_LEVEL,
+) -> Step:
+    """One step of C dT/dt = f(t, T) - K(T) T with K and f of its end, by Picard iteration to `PICARD` K.
+
+    `bdf2` where the temperatures one step before are known, otherwise `backward_euler`; the heat flows are those of the
+    same K and f, so that the heat balances whatever is left of the iteration.
+
+    Parameters
+    ----------
+    system : HeatSystem
+        With ``at``.
+    span : (float, float) [s]
+        Start and length of the step.
+    before : (ndarray, ndarray or None, ndarray)
+        Temperatures at the start and one step before it, and the heat flows integrated over that step.
+    guess : ndarray, shape (n,) [K]
+        Temperatures at the end, about.
+    solver_tolerance, exact_level
+        As in `etc_engine.solvers.marching.march`.
+
+    Raises
+    ------
+    ConvergenceError
+        If a temperature still changes after `MOST_PICARD` iterations.
+    """
+    assert system.at is not None
+    (t, h), (old, older, last_heat) = span, before
+    rate = (1.0 if older is None else 1.5) / h
+    found, spent, change = guess, 0, np.inf
+    for _ in range(MOST_PICARD):
+        local = system.at(t + h, found)
+        matrix = step_matrix(local.conductance, local.capacity, rate, solver_tolerance, exact_level=exact_level)
+        if older is None:
+            taken = backward_euler(local, matrix, t, h, old)
+        else:
+            taken = bdf2(local, matrix, t, h, old, older, last_heat)
+        change = float(np.abs(taken.temperatures - found).max())
+        found, spent = taken.temperatures, spent + taken.iterations
+        if change < PICARD:
+            return replace(taken, iterations=spent)
+    raise ConvergenceError(
+        f"after {MOST_PICARD} iterations of the step to t = {t + h:g} s a temperature still changes by {change:.3g} K: "
+        "take smaller steps"
+    )

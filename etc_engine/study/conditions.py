@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,6 +37,56 @@ def check_conditions(study: Study) -> None:
     if first["temperature"] is not None and not (named or study.pores.gas or glow):
         raise ValueError("conduction.temperature: has no meaning without a material, a gas or radiation, take it out")
     derived_conductivities(study)
+    if study.conduction.nonlinear:
+        _check_local(study)
+
+
+def _check_local(study: Study) -> None:
+    """Refuse properties at the local temperature without walls and their temperatures, or out of their ranges.
+
+    Raises
+    ------
+    ValueError
+    """
+    box, middles, differences = study.box, study.values("temperature"), study.values("temperature_difference")
+    if all(box.periodic):
+        raise ValueError(
+            f"conduction.nonlinear: the temperature varies between two walls, found a box periodic along "
+            f"{box.periodic_axes}: leave an axis out of packing.periodic"
+        )
+    for name, given in (("temperature", middles), ("temperature_difference", differences)):
+        if not given:
+            raise ValueError(f"conduction.{name}: missing, nonlinear = true needs the temperatures of the walls [K]")
+    ends = min(middles) - 0.5 * max(differences), max(middles) + 0.5 * max(differences)
+    if ends[0] <= 0.0:
+        raise ValueError(
+            f"conduction.temperature_difference: found {max(differences):g}, the cold wall would be at {ends[0]:g} K"
+        )
+    types = getattr(study.particles, "types", None) or {}
+    solids: dict[str, str | dict[str, Any]] = {
+        f"particles.types.{key}": word for key, word in types.items() if isinstance(word, str)
+    }
+    if study.particles.material is not None:
+        solids["particles.material"] = study.particles.material
+    for place, word in solids.items():
+        _in_range(place, find_solid(word).conductivity.at, ends)
+    if study.pores.gas is not None:
+        gas, pressure = study.pores.gas, max(study.values("pressure"))
+        _in_range("pores.gas", lambda t: gas_state(gas, t, pressure), ends)
+
+
+def _in_range(place: str, value: Callable[[float], object], temperatures: tuple[float, float]) -> None:
+    """Refuse walls at which a property is not known.
+
+    Raises
+    ------
+    ValueError
+    """
+    for temperature in temperatures:
+        try:
+            value(temperature)
+        except InputError as error:
+            raise ValueError(f"{place}: at the wall of {temperature:g} K {error}") from None
 
 
 def derived_conductivities(study: Study) -> Derived:

@@ -19,6 +19,9 @@ NOT_SWEPT = ("dipoles", "threads")
 NONE = ""
 """The word of a choice that is left out."""
 
+TRUE, FALSE = "true", "false"
+"""The words of a switch."""
+
 OPTIONS = {
     name: option for engine in ENGINES.values() for name, option in engine.options.items() if name not in NOT_SWEPT
 }
@@ -39,6 +42,10 @@ def _meanings() -> Iterator[tuple[str, Needs]]:
         methods = [(e, m) for e, engine in ENGINES.items() for m, row in engine.methods.items() if name in row.options]
         engines, words = (tuple(dict.fromkeys(column)) for column in zip(*methods, strict=True))
         yield f"conduction.{name}", {"conduction.engine": engines, "conduction.method": words}
+    local = [(e, m) for e, engine in ENGINES.items() for m, row in engine.methods.items() if row.local]
+    engines, words = (tuple(dict.fromkeys(column)) for column in zip(*local, strict=True))
+    yield "conduction.nonlinear", {"conduction.engine": engines, "conduction.method": words}
+    yield "conduction.temperature_difference", {"conduction.nonlinear": (TRUE,)}
     yield "packing.count", {"packing.method": ("lubachevsky-stillinger", "random-sequential")}
     yield "packing.growth_rate", {"packing.method": ("lubachevsky-stillinger",)}
 
@@ -54,6 +61,8 @@ def chosen(study: StudyTable, place: str) -> tuple[str, ...]:
         return tuple(found.methods)
     for key in place.split("."):
         found = getattr(found, key)
+    if isinstance(found, bool):
+        return (TRUE if found else FALSE,)
     return (NONE,) if found is None else (found if isinstance(found, str) else "a table",)
 
 

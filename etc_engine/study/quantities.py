@@ -238,6 +238,15 @@ QUANTITIES: Mapping[str, Quantity] = {
         ),
         Quantity("radiation.emissivity", "1", "emissivity of the particles", "medium", Share, SHARE),
         Quantity("conduction.temperature", "K", "temperature", "medium", Positive, POSITIVE),
+        Quantity(
+            "conduction.temperature_difference",
+            "K",
+            "temperature difference of the two walls",
+            "medium",
+            Positive,
+            POSITIVE,
+            comment="the wall at the low end of an axis is warmer than the temperature by half of it, the other colder",
+        ),
     )
 }
 """The rows by the names of their dimensions, in the order of the dimensions of a result."""

@@ -222,6 +222,7 @@ class Study(StudyFile):
             axes={name: values for name, values in si.items() if name in self.axes},
             material=self.particles.material,
             gas=self.pores.gas,
+            nonlinear=self.conduction.nonlinear,
         )
 
     def _packing_spec(self, density: float | None) -> PackingSpec | PackingSource:

@@ -20,7 +20,7 @@ from etc_engine.realization import ENGINES
 from etc_engine.realization.options import Option
 from etc_engine.study.meaning import OPTIONS
 from etc_engine.study.quantities import QUANTITIES, QuantityTable, T, with_quantities
-from etc_engine.study.schema import Positive, StudyTable, Word, without_repeats
+from etc_engine.study.schema import Flag, Positive, StudyTable, Word, without_repeats
 
 DEFAULT_CAP = 10
 """Without ``max_realizations`` an adaptive sweep stops at this many times ``realizations``."""
@@ -75,6 +75,13 @@ def _field_of(option: Option) -> tuple[Any, Any]:
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 Fraction = Annotated[float, Field(strict=True, gt=0.0, lt=1.0)]
 Engine = Annotated[Word, AfterValidator(_known_engine)]
+Material = Annotated[Word | dict[Word, Any], AfterValidator(_known_solid), WithJsonSchema({"type": "string"})]
+A_MATERIAL = (
+    "a solid by the name that the command `materials` prints, or a table such as "
+    "{ temperature = [300, 900], conductivity = [2.0, 1.5] }"
+)
+Gas = Annotated[Word | dict[Word, Positive], WithJsonSchema({"type": "string"})]
+A_GAS = "a gas by name, such as 'helium', or a table of mole fractions"
 
 
 @with_quantities("packing")
@@ -170,13 +177,7 @@ class MixtureTable(QuantityTable):
 class ParticlesTable(QuantityTable):
     """``[particles]``: what they are made of."""
 
-    material: (
-        Annotated[Word | dict[Word, Any], AfterValidator(_known_solid), WithJsonSchema({"type": "string"})] | None
-    ) = Field(
-        default=None,
-        description="a solid by the name that the command `materials` prints, or a table such as "
-        "{ temperature = [300, 900], conductivity = [2.0, 1.5] }",
-    )
+    material: Material | None = Field(default=None, description=A_MATERIAL)
     mixture: MixtureTable | None = Field(
         default=None, description="a table such as { conductivity = 10.0, fraction = 0.3 }"
     )
@@ -186,9 +187,7 @@ class ParticlesTable(QuantityTable):
 class PoresTable(QuantityTable):
     """``[pores]``: what fills them."""
 
-    gas: Annotated[Word | dict[Word, Positive], WithJsonSchema({"type": "string"})] | None = Field(
-        default=None, description="a gas by name, such as 'helium', or a table of mole fractions"
-    )
+    gas: Gas | None = Field(default=None, description=A_GAS)
 
 
 @with_quantities("radiation")
@@ -209,6 +208,11 @@ class ConductionTable(QuantityTable):
     )
     tolerance: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] = Field(
         default=1e-10, description="a relative error of the conductivity, between 0 and 1"
+    )
+
+    nonlinear: Flag = Field(
+        default=False,
+        description="true or false: whether solid, gas and radiation follow the local temperature between two walls",
     )
 
     @model_validator(mode="after")

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from etc_engine.errors import StudyError
+from etc_engine.errors import InputError, StudyError
+from etc_engine.materials import find_solid
+from etc_engine.medium.conditions import Conditions
 from etc_engine.medium.walls import WallCondition
 from etc_engine.realization import ENGINES
-from etc_engine.solvers.marching import SCHEMES
+from etc_engine.solvers.marching import NONLINEAR, SCHEMES
 from etc_engine.study.files import A_SEED, Seed, StudyFile, validated
 from etc_engine.study.meaning import refuse_meaningless
-from etc_engine.study.quantities import QUANTITIES
+from etc_engine.study.quantities import QUANTITIES, SHARE, Accommodation, Share
 from etc_engine.study.schema import (
     AS_LIST,
     AS_NUMBER,
@@ -34,7 +36,16 @@ from etc_engine.study.schema import (
     Times,
     Word,
 )
-from etc_engine.study.tables import ContactsTable, Engine, PackingTable, unknown_method
+from etc_engine.study.tables import (
+    A_GAS,
+    A_MATERIAL,
+    ContactsTable,
+    Engine,
+    Gas,
+    Material,
+    PackingTable,
+    unknown_method,
+)
 from etc_engine.study.walls import A_VALUE, Value, Wall
 
 SOME = Field(min_length=1)
@@ -86,6 +97,12 @@ class Conduction(StudyTable):
     engine: Engine = Field(default="dtem", description="dtem or pipe")
     method: Word = Field(default="", description="a method of the engine")
     dipoles: Flag = Field(default=False, description="true or false")
+    temperature: Positive | None = Field(
+        default=None, description=f"{POSITIVE}, of material, gas and radiation at one temperature [K]"
+    )
+    nonlinear: Flag = Field(
+        default=False, description="true or false: whether material, gas and radiation follow the local temperature"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Conduction:
@@ -149,6 +166,7 @@ class ParticlesTable(StudyTable):
     """``[particles]``: what they are made of, and how warm they are at first; a number, or one for each particle."""
 
     conductivity: Positive = Field(default=1.0, description=f"{POSITIVE} [W/(m K)]")
+    material: Material | None = Field(default=None, description=A_MATERIAL)
     types: dict[str, Positive] | None = Field(
         default=None, description="a table such as { 1 = 2.4, 2 = 1.1 }: conductivity by type of the file [W/(m K)]"
     )
@@ -171,12 +189,28 @@ class PoresTable(StudyTable):
 
     conductivity: NotNegative = Field(default=0.0, description=f"{NOT_NEGATIVE} [W/(m K)]")
     heat_capacity: NotNegative = Field(default=0.0, description=f"{NOT_NEGATIVE}: rho c [J/(m3 K)]")
+    gas: Gas | None = Field(default=None, description=A_GAS)
+    pressure: NotNegative | None = Field(default=None, description=f"{NOT_NEGATIVE}, of the gas [Pa]")
+    accommodation: Accommodation | None = Field(default=None, description="a number above 0, up to 1, of the surfaces")
+
+    @property
+    def filled(self) -> bool:
+        """Whether a fluid conducts in them."""
+        return self.conductivity > 0.0 or bool(self.pressure)
 
     @model_validator(mode="after")
     def _check(self) -> PoresTable:
-        if self.heat_capacity > 0.0 and self.conductivity == 0.0:
+        if self.heat_capacity > 0.0 and not self.filled:
             raise ValueError("heat_capacity: the pores store heat only if they conduct, give a conductivity")
+        if self.gas is not None and self.conductivity > 0.0:
+            raise ValueError("conductivity: has no meaning with gas, take it out")
         return self
+
+
+class RadiationTable(StudyTable):
+    """``[radiation]``: between the surfaces of the particles."""
+
+    emissivity: Share | None = Field(default=None, description=f"{SHARE}, of the particles")
 
 
 class Time(StudyTable):
@@ -243,6 +277,7 @@ class NetworkStudy(StudyFile):
     particles: ParticlesTable = Field(description="a table with heat_capacity and initial")
     contacts: ContactsTable = Field(default_factory=ContactsTable, description="a table")
     pores: PoresTable = Field(default_factory=PoresTable, description="a table with conductivity")
+    radiation: RadiationTable = Field(default_factory=RadiationTable, description="a table with emissivity")
     conduction: Conduction = Field(default_factory=Conduction, description="a table")
     walls: WallsTable = Field(default_factory=WallsTable, description="a table")
     source: list[Source] = Field(default=[], description="tables [[source]] with heat and particles")
@@ -259,6 +294,7 @@ class NetworkStudy(StudyFile):
         if self.motion is None and not self.time.times:
             raise ValueError("time.times: missing, expected the output times; the first one is the start")
         self._check_pores()
+        self._check_temperature()
         if self.motion is not None:
             self._check_motion(self.motion)
         try:
@@ -280,10 +316,62 @@ class NetworkStudy(StudyFile):
                 "give contacts.contact_resistance"
             )
 
+    @property
+    def pores_conduct(self) -> bool:
+        """Whether heat passes through the pores, by a fluid or by radiation."""
+        return self.pores.filled or bool(self.radiation.emissivity)
+
+    def conditions(self, temperature: float | None) -> Conditions:
+        """Gas and radiation of the study at a temperature [K].
+
+        Raises
+        ------
+        InputError
+        """
+        material, gas = self.particles.material, self.pores.gas
+        mass = None if gas is None or material is None else find_solid(material).atomic_mass
+        return Conditions(
+            temperature, gas, self.pores.pressure, self.pores.accommodation, mass, self.radiation.emissivity
+        )
+
+    def _check_temperature(self) -> None:
+        """Material, gas and radiation have a temperature: one of the study, or the local one."""
+        table, row = self.conduction, ENGINES[self.conduction.engine]
+        named = self.particles.material is not None or self.pores.gas is not None or bool(self.radiation.emissivity)
+        if self.particles.material is not None and "conductivity" in self.particles.model_fields_set:
+            raise ValueError("particles.conductivity: has no meaning with material, take it out")
+        try:  # at any temperature: which one is checked when it is known
+            self.conditions(300.0 if table.nonlinear else table.temperature)
+        except InputError as error:
+            raise ValueError(f"pores: {error}") from None
+        if table.temperature is not None and (table.nonlinear or not named):
+            choice = "with nonlinear = true" if table.nonlinear else "without a material, a gas or radiation"
+            raise ValueError(f"conduction.temperature: has no meaning {choice}, take it out")
+        if self.particles.material is not None and table.temperature is None and not table.nonlinear:
+            raise ValueError("conduction.temperature: missing, the conductivity of particles.material depends on it")
+        if not table.nonlinear:
+            return
+        able = [name for name, method in row.methods.items() if method.local]
+        if not named:
+            raise ValueError("conduction.nonlinear: nothing follows the temperature, give a material or a gas")
+        if not able or (table.method and table.method not in able) or not self.pores_conduct:
+            raise ValueError(
+                "conduction.nonlinear: properties follow the temperature with engine dtem, method facets and pores "
+                "that conduct or radiate"
+            )
+        if self.time.scheme not in NONLINEAR:
+            raise ValueError(
+                f"time.scheme: found {self.time.scheme!r}, allowed with nonlinear = true: {', '.join(NONLINEAR)}"
+            )
+        if self.motion is not None:
+            raise ValueError(
+                "conduction.nonlinear: properties do not follow the temperature with [motion], take it out"
+            )
+
     def _check_pores(self) -> None:
         """The method takes heat through the pores, or not, as they conduct."""
         methods = ENGINES[self.conduction.engine].methods
-        word, conduct = self.conduction.method, self.pores.conductivity > 0.0
+        word, conduct = self.conduction.method, self.pores_conduct
         able = [name for name, row in methods.items() if row.transient and (row.pores != "no") is conduct]
         if word and word not in able and methods[word].pores != "may":
             what = "conduct" if conduct else "do not conduct"

@@ -85,7 +85,8 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
         dataset["conductivity_bounds"] = ((*cell, "direction_i", "bound"), cells["conductivity_bounds"], meaning)
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
     for name, variable in CELL_VARIABLES.items():
-        dataset[name] = (cell, cells[name], variable.attributes)
+        if name != "heat_imbalance" or study.conduction.nonlinear:
+            dataset[name] = (cell, cells[name], variable.attributes)
     dataset["status"] = (cell, cells["status"], _status_attributes())
     dataset["message"] = (cell, cells["message"], {"long_name": "what went wrong, in words"})
     for name, variable in UNIT_VARIABLES.items():

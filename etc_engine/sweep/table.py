@@ -48,6 +48,9 @@ CELL_VARIABLES = {
     "mean_field_conductivity": Variable(
         np.float64, np.nan, "contact mean field of the network: pipes under an affine temperature", "W m-1 K-1"
     ),
+    "heat_imbalance": Variable(
+        np.float64, np.nan, "heat in at one wall less heat out at the other, over the heat flow; of nonlinear studies"
+    ),
     "solve_seconds": Variable(np.float64, np.nan, "time to solve", "s"),
     "solved_by": Variable(object, "", "full, or reduced: made of the solutions at other contact angles"),
     "snapshots": Variable(np.int64, -1, "solutions at other contact angles in a reduced one"),

@@ -13,7 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.box import parse_periodic
 from etc_engine.durable.stop import Stopped, StopRequest
 from etc_engine.errors import ConvergenceError, StudyError
-from etc_engine.medium.medium import Medium, Pores
+from etc_engine.materials import find_solid
+from etc_engine.medium.conditions import pores_at
+from etc_engine.medium.local import LocalProperties, solid_law
+from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import find_rule
 from etc_engine.medium.transient import HeatSource, ParticleSystem
@@ -219,13 +222,24 @@ class _Physics:
     study: NetworkStudy
     conductivity: ArrayLike
     source: Callable[[float], NDArray[np.float64]]
+    temperature: float | None = None
 
     def system(self, network: ContactNetwork, capacities: NDArray[np.float64] | None = None) -> ParticleSystem:
         """The system of a contact network, with given heat capacities of the particles or the study's."""
         conduction = self.study.conduction
         heat_capacity = np.asarray(self.study.particles.heat_capacity, dtype=np.float64)
-        pores = Pores(self.study.pores.conductivity, self.study.pores.heat_capacity)
+        conditions = self.study.conditions(self.temperature)
+        pores = replace(
+            pores_at(conditions, network.packing, self.study.pores.conductivity),
+            heat_capacity=self.study.pores.heat_capacity,
+        )
         medium = Medium(network.packing, np.asarray(self.conductivity), network, pores, heat_capacity)
+        if conduction.nonlinear:
+            every = np.ones(network.packing.count, dtype=np.bool_)
+            named = find_solid(self.study.particles.material).conductivity if self.study.particles.material else None
+            law = solid_law(medium.conductivity, () if named is None else ((every, named),))
+            local = LocalProperties(network.packing, conditions, law, self.study.pores.conductivity)
+            medium = replace(medium, local=local)
         return transient_system(
             medium,
             self.study.walls.conditions(),
@@ -238,7 +252,15 @@ class _Physics:
 
 
 def _physics(study: NetworkStudy, table: ParticleTable) -> _Physics:
-    return _Physics(study, conductivity_of(study, table), _source(study, table))
+    temperature = study.conduction.temperature
+    if study.conduction.nonlinear:
+        initial = np.asarray(initial_of(study, table), dtype=np.float64)
+        if not initial.min() > 0.0:
+            raise StudyError(
+                f"particles.initial: found {initial.min():g} K, nonlinear = true takes absolute temperatures"
+            )
+        temperature = float(initial.mean())
+    return _Physics(study, conductivity_of(study, table, temperature), _source(study, table), temperature)
 
 
 def _fraction(progress: Progress | None, begin: float, end: float) -> Progress | None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.errors import StudyError
+from etc_engine.materials import find_solid
 from etc_engine.particle_files.sample import Sample
 from etc_engine.particle_files.table import ParticleTable
 from etc_engine.study.file_packings import sample_of
@@ -48,8 +49,15 @@ def rows_of(source: Source, table: ParticleTable, place: str) -> NDArray[np.int6
     return rows
 
 
-def conductivity_of(study: NetworkStudy, table: ParticleTable) -> ArrayLike:
+def conductivity_of(study: NetworkStudy, table: ParticleTable, temperature: float | None = None) -> ArrayLike:
     """Conductivity of all particles, or of each by its type or the column of its file [W/(m K)].
+
+    Parameters
+    ----------
+    study : NetworkStudy
+    table : ParticleTable
+    temperature : float, optional [K]
+        Of a material by name.
 
     Raises
     ------
@@ -57,6 +65,12 @@ def conductivity_of(study: NetworkStudy, table: ParticleTable) -> ArrayLike:
     """
     particles = study.particles
     given = "conductivity" in particles.model_fields_set
+    if particles.material is not None:
+        if particles.types is not None or table.conductivity is not None:
+            what = "particles.types" if particles.types is not None else "a column 'conductivity' of the file"
+            raise StudyError(f"particles.material: {what} says what the particles are too, take one of them out")
+        assert temperature is not None
+        return find_solid(particles.material).conductivity.at(temperature)
     if particles.types is not None:
         if given or table.conductivity is not None:
             what = "particles.conductivity" if given else "a column 'conductivity' of the file"

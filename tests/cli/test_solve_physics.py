@@ -136,13 +136,20 @@ def test_walls_of_two_temperatures(tmp_path, capfd):
     assert far["heat_flow"] == pytest.approx(far["conductivity_between_walls"] * 600.0 * 2.0 * r * n, rel=1e-9)
     assert far["conductivity_between_walls"] != pytest.approx(near["conductivity"], rel=1e-4)
     assert far["nonlinear_iterations"] > 2
+    walled = [*bed[:3], "--axis", "all"]
+    every = solved(capfd, *walled, *gas, "--wall-temperatures", "300:900")
+    assert set(every["conductivity_between_walls_per_axis"]) == {"x", "y", "z"}
+    assert every["conductivity_between_walls_per_axis"]["y"] == pytest.approx(every["conductivity_between_walls"])
+    partly = solved(capfd, *bed[:-2], "--axis", "all", *gas, "--wall-temperatures", "300:900")
+    assert set(partly["conductivity_between_walls_per_axis"]) == {"z"}
+    assert partly["conductivity_between_walls"] == pytest.approx(far["conductivity_between_walls"], rel=1e-9)
 
 
 @pytest.mark.parametrize(
     ("extra", "message"),
     [
         (["--wall-temperatures", "900"], "two temperatures"),
-        (["--wall-temperatures", "900:600"], "method facets and one --axis"),
+        (["--wall-temperatures", "900:600"], "method facets, found"),
     ],
 )
 def test_what_walls_need(bed, capfd, extra, message):

@@ -278,3 +278,40 @@ def test_a_source_that_is_not_finite_is_named():
     for scheme, control in (("bdf2", {"steps": 10}), ("adaptive", {})):
         with pytest.raises(ConvergenceError, match=r"check the sources and walls"):
             list(march(system, np.ones(2), [0.0, 1.0], scheme=scheme, **control))
+
+
+def radiating(power=4):
+    """C dT/dt = -T^p of one node: a conductance T^(p-1) to an ambient of 0."""
+
+    def at(_, T):
+        return HeatSystem(np.ones(1), csr_matrix([[float(T[0]) ** (power - 1)]]), lambda _: np.zeros(1))
+
+    return HeatSystem(np.ones(1), csr_matrix([[1.0]]), lambda _: np.zeros(1), at=at)
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("backward-euler", 1), ("bdf2", 2)])
+def test_a_conductance_that_follows_the_temperature(scheme, order):
+    """dT/dt = -T^4: T = (T_0^-3 + 3 t)^(-1/3); the heat stored is the heat that came in."""
+    errors = []
+    for steps in (10, 20, 40, 80):
+        *_, last = march(radiating(), np.full(1, 1.2), [0.0, 0.4, 1.0], scheme=scheme, steps=steps)
+        errors.append(abs(last.temperatures[0] - (1.2**-3 + 3.0) ** (-1.0 / 3.0)))
+        assert abs(last.imbalance) < 1e-14
+        assert last.stored == pytest.approx(last.temperatures[0] - 1.2, rel=1e-12)
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders[-1] == pytest.approx(order, abs=0.15)
+
+
+def test_a_restart_of_a_nonlinear_march_has_the_same_bits():
+    whole = list(march(radiating(), np.full(1, 1.2), [0.0, 0.4, 0.8, 1.0], scheme="bdf2", step=0.02))
+    for state in whole[:-1]:
+        again = list(march(radiating(), np.full(1, 1.2), [0.0, 0.4, 0.8, 1.0], scheme="bdf2", step=0.02, restart=state))
+        assert again[-1].temperatures.tobytes() == whole[-1].temperatures.tobytes()
+        assert again[-1].heat.tobytes() == whole[-1].heat.tobytes()
+
+
+def test_what_a_nonlinear_march_refuses():
+    with pytest.raises(InputError, match=r"scheme backward-euler or bdf2, found 'crank-nicolson'"):
+        next(march(radiating(), np.ones(1), [0.0, 1.0], scheme="crank-nicolson", steps=5))
+    with pytest.raises(ConvergenceError, match="take smaller steps"):
+        list(march(radiating(12), np.full(1, 3.0), [0.0, 1.0], scheme="backward-euler", steps=1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,11 @@ from etc_engine import Medium, effective_conductivity
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.comparison.sensitivity import sensitivities
 from etc_engine.comparison.simulation import simulated
+from etc_engine.engines.dtem.between_walls import conductivity_between_walls
 from etc_engine.errors import StudyError
 from etc_engine.materials import find_solid, gas_state, jump_length
 from etc_engine.medium.conditions import Conditions, pores_at
+from etc_engine.medium.local import LocalProperties, solid_law
 from etc_engine.medium.rules import find_rule
 from etc_engine.models import evaluate
 from etc_engine.packing import pack
@@ -230,3 +234,63 @@ def test_a_mixture_of_gases():
     assert low < derived_conductivities(study)["pore_conductivity"][1][1, 0] < high
     with pytest.raises(StudyError, match=r"must add up to 1, found 0\.9"):
         parse_study(BED.replace('"helium"', "{ helium = 0.5, argon = 0.4 }"))
+
+
+WALLS = BED.replace('"xyz"', '"xy"').replace(
+    'material_curve = "full"', "nonlinear = true\ntemperature_difference = [2.0, 200.0]"
+)
+
+
+def test_between_walls_the_properties_follow_the_temperature():
+    """Each cell is that of a medium by hand; along axes without walls there is none."""
+    pytest.importorskip("CoolProp")
+    study = parse_study(WALLS.replace("[400.0, 800.0]", "600.0").replace("[1e3, 1e5]", "1e5"))
+    assert list(study.axes) == ["temperature_difference"]
+    spec = study.realization_spec(0.5)
+    found = realize(spec, np.random.default_rng(3))
+    packing = pack(spec.packing, np.random.default_rng(3))
+    network = find_rule("load").contacts(packing, load=2e4, youngs_modulus=370e9, poisson_ratio=0.22, coordination=4.0)
+    solid = find_solid("alumina")
+    conditions = Conditions(600.0, "helium", 1e5, None, solid.atomic_mass, 0.6)
+    law = solid_law(np.ones(packing.count), [(np.ones(packing.count, dtype=bool), solid.conductivity)])
+    medium = Medium(packing, float(solid.conductivity.at(600.0)), network, pores_at(conditions, packing))
+    for difference, outcome in zip((2.0, 200.0), found.cells, strict=True):
+        local = LocalProperties(packing, conditions, law, 0.0, (600.0 + difference / 2.0, 600.0 - difference / 2.0))
+        by_hand, _ = conductivity_between_walls(replace(medium, local=local))
+        np.testing.assert_allclose(outcome.conductivity, by_hand.tensor, rtol=1e-12)
+        assert np.isnan(outcome.conductivity[:2, :2]).all()
+        assert outcome.heat_imbalance < 1e-9
+    linear = effective_conductivity(medium, axes=(2,), method="facets").tensor[2, 2]
+    near, far = (outcome.conductivity[2, 2] for outcome in found.cells)
+    assert near == pytest.approx(linear, rel=1e-5)
+    assert far != pytest.approx(linear, rel=1e-3)
+
+
+def test_the_result_between_walls_has_its_heat_balance_and_its_means(made_sweep):
+    pytest.importorskip("CoolProp")
+    data = made_sweep(WALLS, lambda *_: [np.nan, np.nan, 2.0])
+    assert "heat_imbalance" in data and data["conductivity"].sizes["temperature_difference"] == 2
+    assert data["temperature_difference"].attrs["units"] == "K"
+    assert (simulated(data)["conductivity_mean"] == 2.0).all()
+    assert "heat_imbalance" not in made_sweep(BED, lambda *_: 1.0)
+    comparison = evaluate_models(data)
+    assert not comparison.attrs["bounds_bind"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"xy"', '"xyz"', "conduction.nonlinear: the temperature varies between two walls"),
+        ("temperature_difference = [2.0, 200.0]\n", "", "conduction.temperature_difference: missing"),
+        ("[2.0, 200.0]", "[2.0, 800.0]", "the cold wall would be at 0 K"),
+        ("[2.0, 200.0]", "[2.0, 700.0]", "particles.material: at the wall of 50 K"),
+        ("nonlinear = true\n", "", "conduction.temperature_difference: has no meaning with nonlinear = 'false'"),
+        ("nonlinear = true\n", 'method = "cell"\nnonlinear = true\n', "conduction.method: method 'cell'"),
+    ],
+)
+def test_what_walls_of_two_temperatures_need(old, new, message):
+    pytest.importorskip("CoolProp")
+    assert old in WALLS
+    with pytest.raises(StudyError) as caught:
+        parse_study(WALLS.replace(old, new))
+    assert message in str(caught.value)

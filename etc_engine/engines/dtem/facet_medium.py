@@ -1,4 +1,4 @@
-"""Facet links on a medium: conductivity of one and of many, fields, and spheres that store heat."""
+"""Facet links on a medium: conductivity of one and of many, and fields."""
 
 from __future__ import annotations
 
@@ -10,33 +10,23 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from etc_engine.engines.dtem.assembly import assemble
-from etc_engine.engines.dtem.facet_elements import (
-    FacetMaterial,
-    FacetSides,
-    facet_elements,
-    facet_resistances,
-    facet_sides,
-)
+from etc_engine.engines.dtem.facet_elements import FacetMaterial, FacetSides
 from etc_engine.engines.dtem.facet_family import FEW_MATERIALS, FamilyMember, solve_family
+from etc_engine.engines.dtem.facet_nonlinear import MaterialAt
 from etc_engine.engines.dtem.facet_steady import (
     FacetSolution,
     accuracy_warnings,
     facet_conductivity,
     uniform_material,
 )
-from etc_engine.engines.dtem.storage import with_states
-from etc_engine.errors import EtcError, GeometryError
+from etc_engine.errors import EtcError, InputError
 from etc_engine.medium.conduction import Conduction, Result, attempt
 from etc_engine.medium.conductivity import EffectiveConductivity, conductivities
 from etc_engine.medium.facets import FacetLinks, facet_links, links_network, no_contacts
 from etc_engine.medium.field import ParticleField
 from etc_engine.medium.loads import asked_groups, driven_walls, wall_temperatures
 from etc_engine.medium.medium import Medium, check_conductors
-from etc_engine.medium.sides import ContactSides, contact_sides
-from etc_engine.medium.transient import ParticleSystem, Source, joined_walls, particle_capacities, state_source
-from etc_engine.medium.wall_nodes import heat_system, number_nodes
-from etc_engine.medium.walls import WallCondition, wall_conditions
+from etc_engine.medium.sides import contact_sides
 
 Floats = NDArray[np.float64]
 
@@ -65,6 +55,27 @@ def medium_material(medium: Medium, links: FacetLinks) -> FacetMaterial:
     return uniform_material(
         links, medium.conductivity, pores.conductivity, pores.jump_length, pores.radiation, pores.in_open_pores
     )
+
+
+def local_material(medium: Medium, links: FacetLinks) -> MaterialAt:
+    """What spheres and pores of a medium are made of, by the temperatures of spheres and links.
+
+    Raises
+    ------
+    InputError
+        If the properties of the medium do not follow the temperature; from the function, if a temperature is out of
+        the range of a property or a sphere conducts less than the pores.
+    """
+    check_conductors(medium)
+    local = medium.local
+    if local is None:
+        raise InputError("the properties of this medium do not follow the temperature: give it local properties")
+
+    def material_at(spheres: Floats, between: Floats) -> FacetMaterial:
+        fluid, open_fluid, jumps, radiation = local.pores(between)
+        return uniform_material(links, local.solid(spheres), fluid, jumps, radiation, np.minimum(open_fluid, fluid))
+
+    return material_at
 
 
 def sphere_conductivity(
@@ -219,7 +230,7 @@ def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> Part
     links, sides, axis = solution.links, solution.sides, solution.axes[load]
     network = links_network(links, medium.network.rule if medium.network else "none")
     m, w = links.count, links.walls.size
-    into = _into_links(sides, links, solution.heat_flows[:, load])
+    into = into_links(sides, links, solution.heat_flows[:, load])
     mean = solution.sphere_temperatures[:, load].copy()
     node = solution.temperatures[:, load].copy()
     if links.packing.box.periodic[axis]:
@@ -250,101 +261,8 @@ def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> Part
     )
 
 
-def _into_links(sides: FacetSides, links: FacetLinks, flows: Floats) -> Floats:
+def into_links(sides: FacetSides, links: FacetLinks, flows: Floats) -> Floats:
     """Heat into the sphere at either end of each link, rings and columns together, shape (m + w, 2)."""
     place = 2 * sides.links[sides.nodes] + sides.ends
     total = np.bincount(place, weights=flows, minlength=2 * (links.count + links.walls.size))
     return np.asarray(total, dtype=np.float64).reshape(-1, 2)
-
-
-def sphere_system(
-    medium: Medium,
-    walls: Mapping[str, WallCondition],
-    *,
-    method: str = "facets",
-    dipoles: bool = False,
-    source: Source = 0.0,
-    capacities: Floats | None = None,
-    **_: object,
-) -> ParticleSystem:
-    """Spheres that store heat, with the fluid around them, and the conditions at the walls of the box.
-
-    Parameters
-    ----------
-    medium : Medium
-        Three-dimensional, with heat capacities, and pores that conduct (and may store heat).
-    walls : mapping of str to condition
-        By the names of `etc_engine.medium.walls.WALLS`; a wall that is not named is insulated.
-    method : str
-        ``facets``.
-    dipoles : bool
-        Whether the spheres have dipole states, for earlier times.
-    source : float, array_like, shape (n,), or callable of t [W]
-        Heat set free evenly in all spheres, or in each.
-    capacities : ndarray, shape (n,), optional [J/K]
-        Of the spheres; rho c times what their contacts leave of them by default. That of the fluid is added.
-
-    Returns
-    -------
-    ParticleSystem
-        With 4 states per sphere with dipoles, otherwise 1. Its medium has a link for every facet.
-
-    Raises
-    ------
-    InputError, GeometryError
-
-    Notes
-    -----
-    The fluid of a Laguerre cell stores its heat at the mean temperature of the sphere inside. At rest the temperatures
-    are those of the steady method.
-    """
-    links = medium_links(medium)
-    material = medium_material(medium, links)
-    conditions = wall_conditions(medium.box, walls)
-    kept = joined_walls(links.walls, conditions)
-    sides = facet_sides(links, kept, bool((material.open_fluid > 0.0).all()))
-    scales = material.conductivity * links.packing.radii
-    h = facet_resistances(links, material, sides)
-    facet_elements(sides, h)  # mends what is not positive definite
-    elements, bad = with_states(h, sides.offsets, sides.nodes, scales, 3, dipoles=dipoles)
-    if bad >= 0:
-        cure = "leave the dipoles out or use smaller contacts" if dipoles else "use smaller contacts"
-        raise GeometryError(
-            f"sphere {bad} has no positive definite resistance to heat that it stores (method {method}): {cure}"
-        )
-    n, states = medium.packing.count, 4 if dipoles else 1
-    stored = np.repeat(_capacities(medium, links, capacities) / states, states)
-    at_walls = sides.links[sides.links >= links.count] - links.count
-    between = sides.links.size - at_walls.size
-    nodes = number_nodes(medium.box, links.walls[at_walls], conditions, contacts=between, states=stored.size)
-    count = nodes.unknowns.size
-    whole = assemble(elements, np.zeros((elements.nodes.size, 0)), np.zeros(count, dtype=np.bool_)).matrix
-    system = heat_system(whole, nodes, stored, state_source(source, n, states))
-    network = links_network(links, medium.network.rule if medium.network else "none")
-    seen = contact_sides(network.select(np.ones(links.count, dtype=np.bool_), kept))
-    is_facet = elements.nodes < count - stored.size
-
-    def flows(time: float, unknowns: Floats) -> Floats:
-        """Q = A (T_c - T_o e), of rings and columns together."""
-        rows = made.node_temperatures(time, unknowns)[elements.nodes]
-        into = _into_links(sides, links, elements.apply(rows[:, None])[is_facet, 0])
-        return _by_side(seen, into[: links.count], into[links.count :][kept, 0])
-
-    made = ParticleSystem(system, medium.with_network(network), nodes, seen, np.flatnonzero(kept), flows)
-    return made
-
-
-def _by_side(sides: ContactSides, between: Floats, at_walls: Floats) -> Floats:
-    out = np.empty(sides.nodes.size)
-    out[sides.of_contacts] = between
-    out[sides.of_walls] = at_walls
-    return out
-
-
-def _capacities(medium: Medium, links: FacetLinks, given: Floats | None) -> Floats:
-    """Heat capacity of every sphere and of the fluid of its cell, shape (n,) [J/K]."""
-    network = medium.network or no_contacts(medium.packing)
-    whole = medium if medium.network else replace(medium, network=network)
-    solid = particle_capacities(whole, given, cut=False)
-    fluid = np.maximum(links.volumes - network.cut_measures(), 0.0)
-    return np.asarray(solid + medium.pores.heat_capacity * fluid)

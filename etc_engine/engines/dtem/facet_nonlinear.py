@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from etc_engine.arrays import Floats
-from etc_engine.engines.dtem.facet_elements import FacetMaterial
-from etc_engine.engines.dtem.facet_steady import FacetSolution, solve_facets
+from etc_engine.engines.dtem.facet_elements import FacetMaterial, facet_sides
+from etc_engine.engines.dtem.facet_steady import FacetSolution, solve_sides
 from etc_engine.errors import ConvergenceError, InputError
 from etc_engine.medium.facets import FacetLinks
+from etc_engine.medium.loads import driven_walls
 
+LINEAR = 1e-18
+"""Relative error of the energy left in each linear problem: about 1e-9 of its temperatures."""
 MaterialAt = Callable[[Floats, Floats], FacetMaterial]
 """Material from the temperatures [K] of the spheres, shape (n,), and of the links, shape (m + w,)."""
 
@@ -71,6 +74,7 @@ def solve_nonlinear(
     walls : (float, float) [K]
         Temperature of the wall at the low end, and at the far end.
     tolerance : float [K]
+        Largest change of a temperature in the last iteration.
     most : int
         Largest number of iterations.
 
@@ -98,9 +102,13 @@ def solve_nonlinear(
     share = links.packing.centers[:, axis] / links.packing.box.lengths[axis]
     temperatures = low + (high - low) * np.clip(share, 0.0, 1.0)
     change = np.inf
+    sides, solution = None, None
     for iteration in range(1, most + 1):
-        material = material_at(temperatures, link_temperatures(links, temperatures, axis, walls))
-        solution = solve_facets(links, material, (axis,))
+        inside = np.clip(temperatures, min(walls), max(walls))  # facet links may pass a wall by a little
+        material = material_at(inside, link_temperatures(links, inside, axis_walls(links, axis, walls)))
+        if sides is None:
+            sides = facet_sides(links, driven_walls(links, (axis,)), bool((material.open_fluid > 0.0).all()))
+        solution, _ = solve_sides(links, material, (axis,), sides, tolerance=LINEAR, nearby=solution)
         found = high + (low - high) * solution.sphere_temperatures[:, 0]
         change = float(np.abs(found - temperatures).max())
         temperatures = found
@@ -112,12 +120,28 @@ def solve_nonlinear(
     )
 
 
-def link_temperatures(links: FacetLinks, temperatures: Floats, axis: int, walls: tuple[float, float]) -> Floats:
-    """Temperature of every link, shape (m + w,) [K]: mean of both ends; undriven walls have that of their sphere."""
+def axis_walls(links: FacetLinks, axis: int, walls: tuple[float, float]) -> Floats:
+    """Temperature of every wall of the box, shape (2 d,) [K]; NaN but for the two of an axis."""
+    found = np.full(2 * links.packing.dimension, np.nan)
+    found[2 * axis : 2 * axis + 2] = walls
+    return found
+
+
+def link_temperatures(links: FacetLinks, temperatures: Floats, walls: Floats) -> Floats:
+    """Temperature of every link, shape (m + w,) [K]: the mean of its two ends.
+
+    Parameters
+    ----------
+    links : FacetLinks
+    temperatures : ndarray, shape (n,) [K]
+        Of the spheres.
+    walls : ndarray, shape (2 d,) [K]
+        Of the walls of the box; at one that is NaN the link has the temperature of its sphere.
+    """
     between = temperatures[links.pairs].mean(axis=1)
     own = temperatures[links.wall_particles]
-    wall = np.where(links.walls == 2 * axis, walls[0], np.where(links.walls == 2 * axis + 1, walls[1], own))
-    return np.concatenate([between, 0.5 * (own + wall)])
+    wall = walls[links.walls]
+    return np.concatenate([between, 0.5 * (own + np.where(np.isnan(wall), own, wall))])
 
 
 def _balanced(

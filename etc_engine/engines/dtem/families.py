@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from etc_engine.engines.dtem import between_walls
 from etc_engine.engines.dtem import conductivity as elements
 from etc_engine.engines.dtem import facet_medium as sphere_facets
 from etc_engine.engines.dtem.cell import medium as disk_cells
 from etc_engine.engines.dtem.cell.transient import cell_system
 from etc_engine.engines.dtem.cell_3d import medium as sphere_cells
+from etc_engine.engines.dtem.facet_transient import sphere_system
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.transient import element_system
 from etc_engine.errors import InputError
@@ -74,10 +76,10 @@ FAMILIES: Mapping[tuple[str, int], Family] = {
         {"degree": 3, "bounds": False},
     ),
     ("facets", 3): Family(
-        sphere_facets.solve_series,
+        between_walls.solve_series,
         sphere_facets.sphere_field,
         sphere_facets.accuracy_remarks,
-        sphere_facets.sphere_system,
+        sphere_system,
     ),
 }
 """Families by method and dimension; every other method is one of `CONTACTS`."""
