@@ -9,9 +9,7 @@ from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
-
-GAUSS_NODES = 40
-"""Gauss points between two heights where the free part of a sphere is not smooth."""
+from etc_engine.structure.cut_sphere import cut_sphere_volume
 
 
 def union_area(packing: ParticlePacking) -> float:
@@ -55,13 +53,8 @@ def union_area(packing: ParticlePacking) -> float:
 def union_volume(packing: ParticlePacking) -> float:
     r"""Volume of the union of the spheres inside the box.
 
-    As :func:`union_area` in three dimensions: radical planes and walls cut sphere i down to a convex region of
-    volume
-
-    .. math:: V_i = \tfrac13 \Big( R_i A_i + \sum_{faces} c\,F \Big)
-
-    with the plane faces F, each a disk cut by straight lines and thus exact, and the free part A_i of the
-    sphere, integrated over height by Gauss quadrature between all heights where it is not smooth.
+    As :func:`union_area` in three dimensions: radical planes and walls cut sphere i down to a convex region, whose
+    volume :func:`etc_engine.structure.cut_sphere.cut_sphere_volume` has in closed form.
 
     Parameters
     ----------
@@ -71,7 +64,7 @@ def union_volume(packing: ParticlePacking) -> float:
     Returns
     -------
     float
-        Volume [m3], to about 1e-10; overlaps count once, parts behind walls do not count.
+        Volume [m3], exact to rounding; overlaps count once, parts behind walls do not count.
 
     Raises
     ------
@@ -86,9 +79,7 @@ def union_volume(packing: ParticlePacking) -> float:
     """
     if packing.dimension != 3:
         raise InputError(f"union_volume is for spheres in a 3D box, found {packing.dimension}D: use union_area")
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
-    angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
-    return float(_sum_of_cut_spheres(packing.radii, *particle_cuts(packing), angles, shares))
+    return float(_sum_of_cut_spheres(packing.radii, *particle_cuts(packing)))
 
 
 def solid_fraction(packing: ParticlePacking) -> float:
@@ -211,118 +202,9 @@ def _sum_of_cut_disks(radii, starts, normals, cuts):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _face_area(radius, normals, cuts, k):  # type: ignore[no-untyped-def]
-    """Area of the plane face k of a sphere cut by half-spaces: a disk cut by half-planes."""
-    count, flat_normals, flat_cuts = 0, np.empty((cuts.size, 2)), np.empty(cuts.size)
-    a, b, c = normals[k, 0], normals[k, 1], normals[k, 2]
-    # an orthonormal basis of the plane
-    if abs(a) < 0.6:
-        first = np.array((0.0, c, -b)) / np.sqrt(b * b + c * c)
-    else:
-        first = np.array((-c, 0.0, a)) / np.sqrt(a * a + c * c)
-    second = np.array((b * first[2] - c * first[1], c * first[0] - a * first[2], a * first[1] - b * first[0]))
-    for m in range(cuts.size):
-        if m == k:
-            continue
-        x, y = np.dot(normals[m], first), np.dot(normals[m], second)
-        slope = np.sqrt(x * x + y * y)
-        room = cuts[m] - cuts[k] * np.dot(normals[m], normals[k])
-        if slope < 1e-12:
-            if room < 0.0 or (room == 0.0 and m < k):
-                return 0.0  # hidden by a parallel plane
-            continue
-        flat_normals[count, 0], flat_normals[count, 1] = x / slope, y / slope
-        flat_cuts[count] = room / slope
-        count += 1
-    return cut_disk_area(np.sqrt((radius - cuts[k]) * (radius + cuts[k])), flat_normals[:count], flat_cuts[:count])
-
-
-@njit(cache=True)
-def _kinks(radius, normals, cuts):  # type: ignore[no-untyped-def]
-    """Heights where the free part of the sphere may not be smooth: ends of the circles, and vertices."""
-    heights = np.empty(2 + 2 * cuts.size + cuts.size * (cuts.size - 1))
-    heights[0], heights[1] = -radius, radius
-    count = 2
-    for k in range(cuts.size):
-        level = np.sqrt(max(0.0, 1.0 - normals[k, 2] ** 2))
-        reach = np.sqrt((radius - cuts[k]) * (radius + cuts[k])) * level
-        heights[count], heights[count + 1] = cuts[k] * normals[k, 2] - reach, cuts[k] * normals[k, 2] + reach
-        count += 2
-        for m in range(k):
-            cosine = np.dot(normals[k], normals[m])
-            square = 1.0 - cosine * cosine
-            if square < 1e-14:
-                continue
-            p, q = (cuts[k] - cosine * cuts[m]) / square, (cuts[m] - cosine * cuts[k]) / square
-            rest = radius * radius - (p * p + q * q + 2.0 * p * q * cosine)
-            if rest <= 0.0:
-                continue
-            across = normals[k, 0] * normals[m, 1] - normals[k, 1] * normals[m, 0]
-            step = np.sqrt(rest / square) * across
-            middle = p * normals[k, 2] + q * normals[m, 2]
-            heights[count], heights[count + 1] = middle - step, middle + step
-            count += 2
-    return np.sort(heights[:count])
-
-
-@njit(cache=True)
-def _free_angle(radius, normals, cuts, z, edges):  # type: ignore[no-untyped-def]
-    """Angle of the sphere's circle at height z that lies within all half-spaces."""
-    ring, count = np.sqrt(max(0.0, (radius - z) * (radius + z))), 0
-    for m in range(cuts.size):
-        level = np.sqrt(normals[m, 0] ** 2 + normals[m, 1] ** 2)
-        room = cuts[m] - normals[m, 2] * z
-        if room >= level * ring:
-            continue
-        if room <= -level * ring:
-            return 0.0
-        middle, opening = np.arctan2(normals[m, 1], normals[m, 0]), np.arccos(room / (level * ring))
-        begin, end = middle - opening, middle + opening
-        if begin < -np.pi:
-            edges[count, 0], edges[count, 1] = begin + 2.0 * np.pi, np.pi
-            begin, count = -np.pi, count + 1
-        elif end > np.pi:
-            edges[count, 0], edges[count, 1] = -np.pi, end - 2.0 * np.pi
-            end, count = np.pi, count + 1
-        edges[count, 0], edges[count, 1] = begin, end
-        count += 1
-    free, reached = 0.0, -np.pi
-    for m in np.argsort(edges[:count, 0]):
-        free += max(edges[m, 0] - reached, 0.0)
-        reached = max(reached, edges[m, 1])
-    return free + max(np.pi - reached, 0.0)
-
-
-@njit(cache=True)
-def cut_sphere_volume(radius, normals, cuts, angles, shares):  # type: ignore[no-untyped-def]
-    """Volume of a sphere within the half-spaces ``normal . p <= cut`` about its centre."""
-    if cuts.size and cuts.min() <= -radius:
-        return 0.0
-    active = np.flatnonzero(cuts < radius)
-    normals, cuts = normals[active], cuts[active]
-    if cuts.size == 0:
-        return 4.0 / 3.0 * np.pi * radius**3
-    volume = 0.0
-    for k in range(cuts.size):
-        volume += cuts[k] * _face_area(radius, normals, cuts, k) / 3.0
-    heights = _kinks(radius, normals, cuts)
-    edges = np.empty((2 * cuts.size, 2))
-    area = 0.0
-    for part in range(heights.size - 1):
-        middle, half = 0.5 * (heights[part] + heights[part + 1]), 0.5 * (heights[part + 1] - heights[part])
-        if half <= 0.0:
-            continue
-        for node in range(angles.size):  # z = middle - half cos(angle) takes out the roots at the ends
-            z = middle - half * np.cos(angles[node])
-            free = _free_angle(radius, normals, cuts, z, edges)
-            area += shares[node] * half * np.sin(angles[node]) * radius * free
-    return volume + radius * area / 3.0
-
-
-@njit(cache=True)
-def _sum_of_cut_spheres(radii, starts, normals, cuts, angles, shares):  # type: ignore[no-untyped-def]
+def _sum_of_cut_spheres(radii, starts, normals, cuts):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(radii.size):
         rows = slice(starts[i], starts[i + 1])
-        total += cut_sphere_volume(radii[i], normals[rows], cuts[rows], angles, shares)
+        total += cut_sphere_volume(radii[i], normals[rows], cuts[rows])
     return total

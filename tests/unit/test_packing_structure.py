@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from etc_engine.box import Box
+from etc_engine.engines.voxel.fractions import ball_in_box
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.structure.cut_sphere import cut_sphere_volume
 from etc_engine.structure.union import solid_fraction, union_area, union_volume
 
 
@@ -111,7 +113,7 @@ def test_three_equal_spheres_by_inclusion_and_exclusion():
     common_to_two = np.pi * (4.0 + 1.0) * (2.0 - 1.0) ** 2 / 12.0
     expected = 4.0 * np.pi - 3.0 * common_to_two + common_to_three
     centers = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, np.sqrt(3.0) / 2.0, 0.0]]) + 2.0
-    assert union_volume(ParticlePacking(centers, [1.0] * 3, Box((6.0,) * 3))) == pytest.approx(expected, rel=1e-7)
+    assert union_volume(ParticlePacking(centers, [1.0] * 3, Box((6.0,) * 3))) == pytest.approx(expected, rel=1e-10)
 
 
 def test_sphere_in_walls_and_corners():
@@ -147,6 +149,43 @@ def test_monte_carlo_agrees_in_space(seed, count, flags):
     fraction = solid_fraction(packing)
     standard_error = np.sqrt(fraction * (1 - fraction) / len(points)) + 1e-6
     assert abs(inside.mean() - fraction) < 5 * standard_error
+
+
+def _half_spaces(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    normals = rng.normal(size=(count, 3))
+    return normals / np.linalg.norm(normals, axis=1)[:, None], rng.uniform(-0.3, 1.2, count)
+
+
+def test_a_plane_divides_a_cut_sphere_without_a_rest():
+    rng = np.random.default_rng(20)
+    for count in rng.integers(1, 9, 300):
+        normals, cuts = _half_spaces(rng, int(count))
+        whole = cut_sphere_volume(1.0, normals[1:], cuts[1:])
+        halves = cut_sphere_volume(1.0, normals, cuts)
+        normals[0], cuts[0] = -normals[0], -cuts[0]
+        halves += cut_sphere_volume(1.0, normals, cuts)
+        assert halves == pytest.approx(whole, abs=1e-12)
+
+
+def test_cut_sphere_in_a_box_is_that_of_the_closed_form_for_boxes():
+    rng = np.random.default_rng(21)
+    axes = np.vstack((np.eye(3), -np.eye(3)))
+    for _ in range(300):
+        low = rng.uniform(-1.2, 0.9, 3)
+        high = low + rng.uniform(0.01, 1.5, 3)
+        turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        volume = cut_sphere_volume(1.0, axes @ turned, np.concatenate((high, -low)))
+        assert volume == pytest.approx(ball_in_box(1.0, low, high), abs=1e-12)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-14, 1e-10, 1e-6])
+def test_planes_through_the_centre_and_nearly_so(off):
+    axes = np.vstack((np.eye(3), -np.eye(3)))
+    for place in np.ndindex(3, 3, 3):
+        low = 0.4 * np.array(place) - 0.8 + off * np.array((1.0, -0.3, 0.7))
+        high = low + 0.8
+        volume = cut_sphere_volume(1.0, axes, np.concatenate((high, -low)))
+        assert volume == pytest.approx(ball_in_box(1.0, low, high), abs=1e-12 if off == 0.0 else 2e-8)
 
 
 def test_the_other_dimension_is_refused():

@@ -59,7 +59,7 @@ def test_the_voxels_hold_the_exact_volume_of_overlapping_inclusions(d, periodic)
     made = composite(rng.random((15, d)) * box.lengths, rng.uniform(0.1, 0.2, 15), box)
     assert count_overlaps(made.packing) > 5
     image = voxelize(made, 20)
-    assert image.volume_fraction == pytest.approx(made.solid_fraction, abs=1e-9)
+    assert image.volume_fraction == pytest.approx(made.solid_fraction, abs=1e-12)
     assert image.fractions.max() <= 1.0 + 1e-12
     assert image.conductivity.mean() == pytest.approx(image.conductivity.mean().T)
 

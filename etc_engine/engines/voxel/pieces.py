@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from etc_engine.engines.voxel.fractions import ball_in_box
 from etc_engine.packing.particles import ParticlePacking
-
-# the sphere or disk within half-spaces, which the exact union of a packing is made of
-from etc_engine.structure.union import GAUSS_NODES, cut_disk_area, cut_sphere_volume, particle_cuts
+from etc_engine.structure.cut_sphere import cut_sphere_volume
+from etc_engine.structure.union import cut_disk_area, particle_cuts
 
 GRAIN = 1e-9
 """Part of a voxel below which a plane or a sphere does not cut it."""
@@ -36,21 +35,18 @@ class Pieces:
 
 def find_pieces(inclusions: ParticlePacking, shape: tuple[int, ...]) -> Pieces:
     """Pieces of all inclusions in the voxels of a grid of a shape over the box."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_NODES)
-    angles, shares = 0.5 * np.pi * (nodes + 1.0), 0.5 * np.pi * weights
     steps = np.asarray(inclusions.box.lengths) / np.asarray(shape)
     starts, normals, cuts = particle_cuts(inclusions)
     owner, count, voxel, inclusion, fraction, normal, central = _walk(
         (inclusions.centers, inclusions.radii),
         (np.asarray(shape), steps, np.asarray(inclusions.box.periodic)),
         (starts, np.ascontiguousarray(normals), cuts),
-        (angles, shares),
     )
     return Pieces(owner, voxel[:count], inclusion[:count], fraction[:count], normal[:count], central[:count])
 
 
 @njit(cache=True)
-def _walk(inclusions, grid, planes, rule):  # type: ignore[no-untyped-def]
+def _walk(inclusions, grid, planes):  # type: ignore[no-untyped-def]
     """Fraction |ball n half-spaces n voxel| / |voxel| of every voxel that an inclusion reaches, by `_share`.
 
     A 2D grid is walked as one layer of a 3D one. Full voxels become ``owner``, the others a piece each, whose normal
@@ -59,7 +55,6 @@ def _walk(inclusions, grid, planes, rule):  # type: ignore[no-untyped-def]
     centers, radii = inclusions
     shape, steps, periodic = grid
     starts, normals, cuts = planes
-    angles, shares = rule
     d = centers.shape[1]
     owner = np.full(np.prod(shape), -1, dtype=np.int64)
     count, room = 0, 1024
@@ -88,7 +83,7 @@ def _walk(inclusions, grid, planes, rule):  # type: ignore[no-untyped-def]
                         middle[a] = 0.5 * (low[a] + high[a])
                         square += middle[a] * middle[a]
                         flat = flat * shape[a] + index[a] % shape[a]
-                    part = _share(radius, low, high, own_normals, own_cuts, volume, angles, shares)
+                    part = _share(radius, low, high, own_normals, own_cuts, volume)
                     if part <= GRAIN:
                         continue
                     if part >= 1.0 - GRAIN:
@@ -121,7 +116,7 @@ def _longer(values, room):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _share(radius, low, high, normals, cuts, volume, angles, shares):  # type: ignore[no-untyped-def]
+def _share(radius, low, high, normals, cuts, volume):  # type: ignore[no-untyped-def]
     """Part of a voxel, given by its corners from the centre, that an inclusion within its half-spaces fills."""
     d = low.size
     nearest, farthest = 0.0, 0.0
@@ -132,7 +127,8 @@ def _share(radius, low, high, normals, cuts, volume, angles, shares):  # type: i
     if nearest >= radius * radius:
         return 0.0
     whole = farthest <= radius * radius
-    crossing = 0
+    planes, distances = np.empty((2 * d + cuts.size, d)), np.empty(2 * d + cuts.size)
+    crossing = 2 * d
     for m in range(cuts.size):
         middle, reach = 0.0, 0.0
         for a in range(d):
@@ -140,23 +136,30 @@ def _share(radius, low, high, normals, cuts, volume, angles, shares):  # type: i
             reach += 0.5 * (high[a] - low[a]) * abs(normals[m, a])
         if middle - reach >= cuts[m] - GRAIN * reach:
             return 0.0
-        if middle + reach > cuts[m] + GRAIN * reach:
+        if middle + reach > cuts[m] + GRAIN * reach and _cap_meets(radius, cuts[m], normals[m], low, high):
+            planes[crossing], distances[crossing] = normals[m], cuts[m]
             crossing += 1
-    if crossing == 0:
+    if crossing == 2 * d:
         return 1.0 if whole else min(ball_in_box(radius, low, high) / volume, 1.0)
-    planes, distances = np.zeros((2 * d + crossing, d)), np.empty(2 * d + crossing)
+    planes[: 2 * d] = 0.0
     for a in range(d):
         planes[2 * a, a], distances[2 * a] = 1.0, high[a]
         planes[2 * a + 1, a], distances[2 * a + 1] = -1.0, -low[a]
-    crossing = 2 * d
-    for m in range(cuts.size):
-        middle, reach = 0.0, 0.0
-        for a in range(d):
-            middle += 0.5 * (low[a] + high[a]) * normals[m, a]
-            reach += 0.5 * (high[a] - low[a]) * abs(normals[m, a])
-        if middle + reach > cuts[m] + GRAIN * reach:
-            planes[crossing], distances[crossing] = normals[m], cuts[m]
-            crossing += 1
+    planes, distances = planes[:crossing], distances[:crossing]
     if d == 2:
         return min(cut_disk_area(radius, planes, distances) / volume, 1.0)
-    return min(cut_sphere_volume(radius, planes, distances, angles, shares) / volume, 1.0)
+    return min(cut_sphere_volume(radius, planes, distances) / volume, 1.0)
+
+
+@njit(cache=True)
+def _cap_meets(radius, cut, normal, low, high):  # type: ignore[no-untyped-def]
+    """Whether a box may hold a part of the cap beyond a plane, which a ball about the cap's base encloses."""
+    if cut >= radius:
+        return False
+    if cut <= 0.0:
+        return True
+    distance = 0.0
+    for a in range(low.size):
+        away = max(low[a] - cut * normal[a], cut * normal[a] - high[a], 0.0)
+        distance += away * away
+    return distance < (radius - cut) * (radius + cut)

@@ -16,8 +16,6 @@ from etc_engine.medium.medium import Medium
 from etc_engine.medium.phases import ROUNDING, check_phases, of_owners
 from etc_engine.packing.neighbors import neighbor_pairs
 
-# the sphere or disk within half-spaces, which the exact union of a packing is made of
-
 VOXELS = ("laminate", "binary")
 FADING = 100.0
 """Contrast of an inclusion to the matrix, or its inverse, beyond which laminates give way to isotropic voxels."""
