@@ -11,6 +11,7 @@ from pathlib import Path
 import etc_engine
 
 STUDIES = Path(__file__).parents[1]
+NOTEBOOKS = STUDIES / "site" / "notebooks"
 OUTSIDE = {"CHANGELOG.md": "changelog", "tests/VALIDATION.md": "validation", "jobs/README.md": "cluster"}
 """Files above the sources, and the page of this folder that includes each."""
 
@@ -51,6 +52,18 @@ def gallery() -> str:
     return "\n".join(["| study | result |", "| --- | --- |", *rows])
 
 
+def notebook(path: Path) -> str:
+    """Return a notebook in percent format as a page: its words, and its code in fences."""
+    _, *parts = re.split(r"^# %%(.*)\n", path.read_text(), flags=re.M)
+    page = []
+    for kind, body in zip(parts[::2], parts[1::2], strict=True):
+        if "[markdown]" in kind:
+            page.append(re.sub(r"^# ?", "", body.strip(), flags=re.M))
+        else:
+            page.append(f"```python\n{body.strip()}\n```")
+    return "\n\n".join(page)
+
+
 def without_bars(lines: list[str]) -> list[str]:
     """Escape the bars of absolute values, which mean substitutions in reStructuredText, outside of literal text."""
     out, literal = [], -1  # indentation of the line that opened a literal block
@@ -81,9 +94,10 @@ def literal_formulas(app: object, what: str, name: str, thing: object, options: 
 
 
 def fill(app: object, name: str, source: list[str]) -> None:
-    """Put the gallery in its place, and turn links that leave the sources to the pages that hold their target."""
+    """Put gallery and notebooks in their places; turn links that leave the sources to pages that hold their target."""
     if name == "site/gallery":
         source[0] = source[0].replace("<!-- gallery -->", gallery())
+    source[0] = re.sub(r"<!-- notebook (\w+) -->", lambda found: notebook(NOTEBOOKS / f"{found[1]}.py"), source[0])
     for path, page in OUTSIDE.items():
         source[0] = re.sub(rf"\]\((\.\./)+{re.escape(path)}(#[\w-]*)?\)", rf"](/site/{page}.md\2)", source[0])
 

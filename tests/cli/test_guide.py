@@ -23,7 +23,7 @@ from etc_engine.sweep.statistics import interval
 
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "studies" / "site"
-PAGES = [ROOT / "README.md", *sorted(SITE.glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted(SITE.rglob("*.md"))]
 FENCE = re.compile(r"^(?:<!-- ([\w ]+) -->\n)?```(\w+)\n(.*?)^```", re.M | re.S)
 
 
@@ -91,6 +91,18 @@ def test_python_runs(page, tmp_path, monkeypatch, made_sweep):
     for mark, text in blocks(page, "python"):
         if mark != "needs a service":
             exec(compile(text, str(page), "exec"), {})
+
+
+@pytest.mark.parametrize("path", sorted((SITE / "notebooks").glob("*.py")), ids=named)
+def test_a_notebook_runs_and_ends_with_its_picture(path, tmp_path):
+    if "import lammps" in path.read_text():
+        pytest.importorskip("lammps")
+    environment = {**os.environ, "MPLBACKEND": "Agg"}
+    line = [sys.executable, "-W", "error", str(path)]
+    done = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for folder in (tmp_path, path.parent):
+        assert (folder / f"{path.stem}.png").stat().st_size > 10_000
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
