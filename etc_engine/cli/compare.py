@@ -25,8 +25,9 @@ COLUMN = 18
 def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     """Compare the sweep in RESULT (netCDF) with conductivity models.
 
-    Prints the simulated mean with its confidence half-width beside every model of the study, and constants fitted
-    over the density. Exit status 3 if a rigorous bound is broken, which is possible for overlapping particles and for
+    Prints the simulated mean with its confidence half-width and the estimated error of its method beside every model
+    of the study, and constants fitted over the density. A closest model is named only where it lies outside that
+    error. Exit status 3 if a rigorous bound is broken, which is possible for overlapping particles and for
     whole cells with pores that conduct only.
     """
     from etc_engine.cli.options import check_picture, check_place, print_json
@@ -92,13 +93,19 @@ def _record(result: Path, output: Path | None, comparison: xarray.Dataset, fits:
         "bounds_bind": bool(comparison.attrs["bounds_bind"]),
         "bound_broken": bool(comparison.attrs["bound_broken"]),
         "best_model": comparison.attrs["best_model"] or None,
+        "best_plain_model": comparison.attrs["best_plain_model"] or None,
+        "within_error": comparison.attrs["within_error"].split(),
         "cells": [_cell_record(labels, cell) for labels, cell in _cells(comparison)],
-        "fits": [asdict(fit) for fit in fits],
+        "fits": [
+            asdict(fit) | {"parameters": [asdict(p) | {"determined": p.determined} for p in fit.parameters]}
+            for fit in fits
+        ],
     }
 
 
 def _cell_record(labels: dict[str, Any], cell: xarray.Dataset) -> dict[str, Any]:
-    numbers = ("solid_fraction", "conductivity_mean", "half_width", "conductivity_ci_low", "conductivity_ci_high")
+    interval = ("half_width", "conductivity_ci_low", "conductivity_ci_high")
+    numbers = ("solid_fraction", "conductivity_mean", *interval, "method_error", "band_low", "band_high")
     return {
         **labels,
         **{name: float(cell[name]) for name in numbers},
@@ -128,6 +135,8 @@ def _print_head(result: Path, comparison: xarray.Dataset) -> None:
         "simulation: mean of the tensor's diagonal over n realizations +- half-width of its "
         f"{100 * level:g} % Student-t interval [W/(m K)]"
     )
+    if bool(comparison["method_error"].notnull().any()):
+        click.echo("error: estimated error of the method, of the discretization too [W/(m K)]; it adds to the interval")
     click.echo(
         "models: conductivity [W/(m K)] and relative difference to the simulation; * the simulation lies beyond it"
     )
@@ -147,17 +156,19 @@ def _print_table(comparison: xarray.Dataset) -> None:
     columns = [dim.split("_") for dim in dims] + [["solid", "fraction"], ["n"]]
     narrow = [max(9, 2 + max(map(len, dim.split("_")))) for dim in dims] + [9, 5]
     models = [name.split("_") for name in shown]
+    simulation = [["simulation"]] + ([["error"]] if bool(comparison["method_error"].notnull().any()) else [])
     deep = max(map(len, [*columns, *models]))
     click.echo()
     for level in range(deep):
         line = "".join(_word(c, level, deep).rjust(w) for c, w in zip(columns, narrow, strict=True))
-        line += _word(["simulation"], level, deep).rjust(20)
+        line += "".join(_word(c, level, deep).rjust(w) for c, w in zip(simulation, (20, 9), strict=False))
         click.echo(line + "".join(_word(m, level, deep).rjust(COLUMN) for m in models))
     for labels, cell in _cells(comparison):
         words = [value if isinstance(value, str) else f"{value:.4g}" for value in labels.values()]
         words += [f"{float(cell['solid_fraction']):.4f}", str(int(cell["count"]))]
         line = "".join(word.rjust(w) for word, w in zip(words, narrow, strict=True))
         line += f"{_number(float(cell['conductivity_mean']))} +- {_number(float(cell['half_width']))}".rjust(20)
+        line += _number(float(cell["method_error"])).rjust(9) if len(simulation) > 1 else ""
         click.echo(line + "".join(_model_words(cell.sel({"model": name})).rjust(COLUMN) for name in shown))
 
 
@@ -180,6 +191,8 @@ def _model_words(one: xarray.Dataset) -> str:
 
 
 def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
+    from etc_engine.comparison.closest import closest_words
+
     click.echo()
     notes = dict(zip(comparison["model"].values.tolist(), comparison["model_note"].values.tolist(), strict=True))
     zero = [name for name, note in notes.items() if note.startswith("is 0")]
@@ -199,12 +212,8 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
         click.echo(f"bounds: they bind {bound}, and are broken")
     else:
         click.echo(f"bounds: they bind {bound}, and every mean and realization keeps them")
-    best = comparison.attrs["best_model"]
-    if best:
-        rms = comparison["rms_relative_difference"].sel({"model": best})
-        click.echo(
-            f"closest model over the sweep: {best}, rms relative difference {100 * float((rms**2).mean()) ** 0.5:.1f} %"
-        )
+    for line in closest_words(comparison):
+        click.echo(line)
 
 
 def _print_fits(fits: tuple[Fit, ...]) -> None:
@@ -215,11 +224,8 @@ def _print_fits(fits: tuple[Fit, ...]) -> None:
         if not fit.parameters:
             reasons.setdefault(f"no fit of {fit.model}: {fit.note}", where)
             continue
-        constants = ", ".join(f"{p.name} {p.value:.4g} [{p.low:.4g}, {p.high:.4g}]" for p in fit.parameters)
-        # an interval wider than twice the value says that the data leave the constant open
-        loose = [p.name for p in fit.parameters if p.high - p.low > 2.0 * abs(p.value)]
-        doubt = f" (not determined by these densities: {', '.join(loose)})" if loose else ""
-        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {constants}{doubt}")
+        constants = ", ".join(map(str, fit.parameters))
+        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {constants}")
     for reason in reasons:
         click.echo(reason)
 

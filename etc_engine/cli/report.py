@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -48,8 +47,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     if len(datasets) > 1:
         drawn["systems"] = figures.draw_system_sizes(systems)
     pictures = {name: figures.png(figure) for name, figure in drawn.items()}
-    fits = [asdict(fit) for fit in fit_models(dataset)]
-    page = report_page(dataset, comparison, fits, systems, pictures)
+    page = report_page(dataset, comparison, fit_models(dataset), systems, pictures)
     with replacing(output) as file:
         file.write_text(page, encoding="utf-8")
     click.echo(f"{output}: {len(page) / 1e6:.1f} MB, {len(pictures)} figures")

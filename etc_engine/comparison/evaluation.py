@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from etc_engine.arrays import Flags, Floats
+from etc_engine.comparison.closest import add_closest, further_inputs
 from etc_engine.comparison.inputs import known_inputs
 from etc_engine.comparison.simulation import Phases, mean_diagonal, phases, simulated, study_of
 from etc_engine.errors import InputError
@@ -77,9 +78,10 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         this bound) and ``bound_broken`` (and the bound binds this geometry). Without ``model``: the simulated
         conductivity with its interval (see `etc_engine.comparison.simulation.simulated`), ``inside_bounds``,
         ``realizations_outside_bounds``. Over the densities: ``rms_relative_difference`` and ``best_model``,
-        among estimates. Coordinates ``model_kind``, ``model_title`` and ``model_note`` (why a value is
-        missing, or 0). Attributes: ``bounds_bind``, ``bounds_unbound`` (why not), ``bound_broken``, ``best_model``,
-        the phases, and ``model_parameters`` as JSON.
+        among estimates. Coordinates ``model_kind``, ``model_title``, ``model_note`` (why a value is
+        missing, or 0) and ``model_inputs`` (what the model knows beyond k1, k2 and the fraction). Attributes:
+        ``bounds_bind``, ``bounds_unbound`` (why not), ``bound_broken``, ``best_model`` and what belongs to it (see
+        `etc_engine.comparison.closest.add_closest`), the phases, and ``model_parameters`` as JSON.
 
     Raises
     ------
@@ -125,10 +127,12 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
     columns = [column.broadcast_like(k).transpose(*k.dims) for column in columns]
     result["model_conductivity"] = xarray.concat(columns, dim=labels, coords="minimal", compat="override")
     records = [find_model(name) for name in parameters]
+    known = [_inputs_of(name, inputs, values) for name, values in parameters.items()]
     result = result.assign_coords(
         model_kind=("model", np.array([model.kind for model in records], dtype=object)),
         model_title=("model", np.array([model.title for model in records], dtype=object)),
         model_note=("model", np.array(notes, dtype=object)),
+        model_inputs=("model", np.array(known, dtype=object)),
     )
     result.attrs |= {
         "pore_conductivity": medium.pores.values.tolist(),
@@ -137,11 +141,11 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
         "dimension": medium.dimension,
         "model_parameters": json.dumps({name: dict(values) for name, values in parameters.items()}),
     }
-    for name, known in inputs.items():
-        result[INPUT + name] = known
+    for name, found in inputs.items():
+        result[INPUT + name] = found
     _add_differences(result)
     _add_bounds(result, dataset, medium)
-    _add_best(result)
+    add_closest(result)
     for name, (meaning, units) in _MEANINGS.items():
         result[name].attrs |= {"long_name": meaning, "units": units}
     return result
@@ -246,6 +250,13 @@ def model_lines(comparison: xarray.Dataset, points: int = 60) -> xarray.Dataset:
     return xarray.concat(curves, dim=labels, coords="minimal", compat="override").to_dataset(name="model_conductivity")
 
 
+def _inputs_of(name: str, inputs: Mapping[str, xarray.DataArray], given: Mapping[str, float]) -> str:
+    """What a model knows beyond the two conductivities and the solid fraction, in words."""
+    if name == MEAN_FIELD and not given:
+        return "the contacts of every packing"
+    return ", ".join(word.replace("_", " ") for word in further_inputs(name, {**inputs, **given}))
+
+
 def _of_model(name: str, inputs: Mapping[str, xarray.DataArray]) -> dict[str, float | xarray.DataArray]:
     """Those of the known inputs that a model takes."""
     return {item.name: inputs[item.name] for item in find_model(name).inputs if item.name in inputs}
@@ -340,23 +351,6 @@ def _outside_wiener(dataset: xarray.Dataset, medium: Phases) -> xarray.DataArray
     return outside.where(fraction.notnull(), False).sum("realization").transpose(*dims)
 
 
-def _add_best(result: xarray.Dataset) -> None:
-    """The estimate of the smallest root mean square relative difference, over densities and over all cells.
-
-    A model that is 0 is 100 % off everywhere and would beat every one that is too high by more: it stays out.
-    """
-    estimates = result["model_kind"].isin(("estimate", "exact"))
-    nonzero = (result["model_conductivity"] > 0.0).any([d for d in result["model_conductivity"].dims if d != "model"])
-    rms = result["rms_relative_difference"].where(estimates & nonzero)
-    names = result["model"].values
-    filled = rms.fillna(np.inf)
-    best = names[filled.argmin("model").values]
-    nearest = filled.min("model")
-    result["best_model"] = nearest.copy(data=np.where(np.isfinite(nearest.values), best, "").astype(object))
-    total = (rms**2).mean([dim for dim in rms.dims if dim != "model"]).fillna(np.inf).values
-    result.attrs["best_model"] = str(names[int(np.argmin(total))]) if np.isfinite(total).any() else ""
-
-
 _MEANINGS = {
     "model_conductivity": ("conductivity by the model", "W m-1 K-1"),
     "relative_difference": ("relative difference of the model to the simulation", "1"),
@@ -365,5 +359,5 @@ _MEANINGS = {
     "bound_broken": ("the simulation lies beyond this bound, which binds its geometry", "1"),
     "inside_bounds": ("the simulation lies inside the bounds of isotropic two-phase media", "1"),
     "realizations_outside_bounds": ("realizations beyond the Wiener bounds of their own solid fraction", "1"),
-    "best_model": ("estimate of the smallest root mean square relative difference", "1"),
+    "best_model": ("estimate of the smallest root mean square relative difference, where the band tells it", "1"),
 }

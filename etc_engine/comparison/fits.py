@@ -19,14 +19,36 @@ if TYPE_CHECKING:
     import xarray
 
 
+OPEN = 1.0
+"""An interval wider than this many times the value leaves the constant open."""
+
+UNDETERMINED = "not determined by these densities"
+
+
 @dataclass(frozen=True)
 class Parameter:
-    """A fitted constant; ``low`` and ``high`` end its confidence interval, NaN where the data do not bound it."""
+    """A fitted constant; ``low`` and ``high`` end its confidence interval, NaN where the data do not bound it.
+
+    Examples
+    --------
+    >>> str(Parameter("threshold", 0.3653, -0.81, 1.54)), str(Parameter("exponent", 1.303, 1.251, 1.356))
+    ('threshold not determined by these densities', 'exponent 1.303 [1.251, 1.356]')
+    """
 
     name: str
     value: float
     low: float
     high: float
+
+    @property
+    def determined(self) -> bool:
+        """Whether the data determine the constant: its interval is finite and narrower than `OPEN` times its value."""
+        return bool(self.high - self.low <= OPEN * abs(self.value))
+
+    def __str__(self) -> str:
+        if not self.determined:
+            return f"{self.name} {UNDETERMINED}"
+        return f"{self.name} {self.value:.4g} [{self.low:.4g}, {self.high:.4g}]"
 
 
 @dataclass(frozen=True)

@@ -187,6 +187,9 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     xarray.Dataset
         ``conductivity_mean``, ``conductivity_sem``, ``half_width``, ``conductivity_ci_low``,
         ``conductivity_ci_high`` [W/(m K)], ``count`` and ``solid_fraction``, on the dimensions of the sweep.
+        ``method_error`` [W/(m K)]: mean over realizations of k times ``model_error_estimate``, the error of the
+        discretization and of the method, NaN where there is no estimate. ``band_low``, ``band_high`` [W/(m K)]: the
+        interval of the mean, wider by the method error at both ends; NaN where there is neither.
 
     Notes
     -----
@@ -194,6 +197,8 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     one conductivity, with less scatter than a component; s is its spread over realizations, not that of a
     component. Realizations without a conductivity stay out; those that do not percolate count as 0. Where there are
     any, the interval is that of `etc_engine.sweep.statistics.interval` and not symmetric; ``half_width`` is half of it.
+    The method error is added to the interval and not to its square: it has the same sign in all realizations, and
+    does not fall with their number.
     """
     valid = dataset["status"] <= int(Status.NOT_PERCOLATING)
     samples = mean_diagonal(dataset["conductivity"]).where(valid)
@@ -210,6 +215,7 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     result["half_width"] = 0.5 * (high - low)
     result["conductivity_ci_low"] = low
     result["conductivity_ci_high"] = high
+    _add_band(result, (samples * dataset["model_error_estimate"]).mean("realization"))
     result["percolating_fraction"] = fraction
     result["count"] = count
     result["solid_fraction"] = dataset["solid_fraction"].mean("realization")
@@ -220,6 +226,15 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     result["percolating_fraction"].attrs = {"long_name": "fraction of the realizations that percolate", "units": "1"}
     result["solid_fraction"].attrs = dict(dataset["solid_fraction"].attrs)
     return result
+
+
+def _add_band(result: xarray.Dataset, error: xarray.DataArray) -> None:
+    """Add the error of the method, and the band that holds it and the scatter of the realizations."""
+    mean, low, high = (result[name] for name in ("conductivity_mean", "conductivity_ci_low", "conductivity_ci_high"))
+    known, wider = low.notnull() | error.notnull(), error.fillna(0.0)
+    result["method_error"] = error.transpose(*mean.dims)
+    result["band_low"] = (low.fillna(mean) - wider).clip(min=0.0).where(known).transpose(*mean.dims)
+    result["band_high"] = (high.fillna(mean) + wider).where(known).transpose(*mean.dims)
 
 
 def _with_zeros(
@@ -250,4 +265,7 @@ _MEANINGS = {
     "half_width": "half-width of the confidence interval of the simulated conductivity",
     "conductivity_ci_low": "lower end of the confidence interval of the simulated conductivity",
     "conductivity_ci_high": "upper end of the confidence interval of the simulated conductivity",
+    "method_error": "estimated error of the method (discretization) in the simulated conductivity",
+    "band_low": "lower end of the confidence interval less the error of the method",
+    "band_high": "upper end of the confidence interval and the error of the method",
 }

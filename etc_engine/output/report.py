@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from etc_engine.comparison.closest import closest_words
 from etc_engine.comparison.sensitivity import sensitivities
 from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
@@ -20,6 +21,8 @@ from etc_engine.study.quantities import SWEPT, heading_of, word_of
 
 if TYPE_CHECKING:
     import xarray
+
+    from etc_engine.comparison.fits import Fit
 
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1d2430; background: #fff;
@@ -46,7 +49,7 @@ pre { background: #f4f6fa; padding: 12px; border-radius: 6px; overflow-x: auto; 
 def report_page(
     dataset: xarray.Dataset,
     comparison: xarray.Dataset,
-    fits: Sequence[Mapping[str, Any]],
+    fits: Sequence[Fit],
     systems: xarray.Dataset,
     pictures: Mapping[str, bytes],
 ) -> str:
@@ -58,8 +61,8 @@ def report_page(
         Result of a sweep.
     comparison : xarray.Dataset
         The models beside it.
-    fits : sequence of mapping
-        The fitted models, as the fields of `etc_engine.comparison.Fit`.
+    fits : sequence of Fit
+        The fitted models.
     systems : xarray.Dataset
         Statistics of the same study over ``system``: boxes of several sizes, or this one alone.
     pictures : mapping of str to bytes
@@ -115,7 +118,8 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
         "realizations of a cell": _range(dataset["count"].values.ravel().tolist()),
         "failed cells": str(failed),
         "rigorous bounds": f"do not bind: {unbound}" if unbound else bound,
-        "closest model": comparison.attrs["best_model"] or "none",
+        "closest model": comparison.attrs["best_model"]
+        or f"not named: {comparison.attrs['best_model_note'] or 'none'}",
     }
     items = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>" for key, value in facts.items())
     return f"<dl class='facts'>{items}</dl>"
@@ -158,7 +162,8 @@ def _statistics(dataset: xarray.Dataset, comparison: xarray.Dataset) -> str:
     text = (
         "<p>Conductivity in W/(m K): mean over n realizations of the mean of the tensor's diagonal, half-width of the "
         f"{100 * level:g} % Student-t interval of that mean, standard error. Realizations that do not percolate count "
-        "as 0. The last column is the number of realizations that would bring the half-width to 1 %.</p>"
+        "as 0. The last column is the number of realizations that would bring the half-width to 1 %. The "
+        "method error is the engine's estimate for its discretization and method; it does not fall with n.</p>"
     )
     head = [
         *_labels(comparison),
@@ -168,6 +173,7 @@ def _statistics(dataset: xarray.Dataset, comparison: xarray.Dataset) -> str:
         "mean",
         "half-width",
         "half-width [%]",
+        "method error [%]",
         "standard error",
         "n for 1 %",
     ]
@@ -185,6 +191,7 @@ def _statistics(dataset: xarray.Dataset, comparison: xarray.Dataset) -> str:
                 _number(mean, ".5g"),
                 _number(width, ".2g"),
                 _number(100.0 * relative, ".2f"),
+                _number(100.0 * float(cell["method_error"]) / mean if mean > 0.0 else math.nan, ".2f"),
                 _number(float(cell["conductivity_sem"]), ".2g"),
                 _number(
                     max(2.0, math.ceil(n * (relative / 0.01) ** 2)) if math.isfinite(relative) else math.nan, ".0f"
@@ -226,23 +233,24 @@ def _models(comparison: xarray.Dataset) -> str:
     zero = [titles[name] for name in names if name not in shown]
     if zero:
         others.insert(0, f"0 because the pores insulate: {', '.join(zero)}")
+    others += closest_words(comparison)
     tail = "".join(f"<p class='faint'>{escape(note)}.</p>" for note in others)
     return text + _table(head, rows, broken) + tail
 
 
-def _fits(fits: Sequence[Mapping[str, Any]]) -> str:
+def _fits(fits: Sequence[Fit]) -> str:
     rows = [
         [
-            fit["model"],
-            ", ".join(word_of(key, value) for key, value in fit["selection"].items()) or "all",
-            str(fit["points"]),
-            "; ".join("{name} {value:.4g} [{low:.4g}, {high:.4g}]".format(**p) for p in fit["parameters"]),
-            _number(100.0 * fit["rms_relative_residual"], ".2f"),
+            fit.model,
+            ", ".join(word_of(key, value) for key, value in fit.selection.items()) or "all",
+            str(fit.points),
+            "; ".join(map(str, fit.parameters)),
+            _number(100.0 * fit.rms_relative_residual, ".2f"),
         ]
         for fit in fits
-        if fit["parameters"]
+        if fit.parameters
     ]
-    reasons = dict.fromkeys(f"No fit of {fit['model']}: {fit['note']}." for fit in fits if not fit["parameters"])
+    reasons = dict.fromkeys(f"No fit of {fit.model}: {fit.note}." for fit in fits if not fit.parameters)
     table = ""
     if rows:
         head = ["fitted model", "part of the sweep", "densities", "constants [confidence interval]", "residual [%]"]

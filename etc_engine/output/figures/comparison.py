@@ -122,7 +122,7 @@ def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
     """Limits of the conductivity: from 0, or about the simulated values where the pores conduct too."""
     if not comparison.attrs["pores_conduct"]:
         return 0.0, None
-    names = ("conductivity_mean", "conductivity_ci_low", "conductivity_ci_high")
+    names = ("conductivity_mean", "band_low", "band_high")
     values = np.concatenate([comparison[name].values.ravel() for name in names])
     values = values[np.isfinite(values)]
     if values.size == 0:
@@ -184,13 +184,10 @@ def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
     looks = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
     for (_, curve), (colour, marker) in zip(_curves(part, axis), looks, strict=False):
         x = curve[axis.dim].values
-        low, high = curve["conductivity_ci_low"].values, curve["conductivity_ci_high"].values
         mean = curve["conductivity_mean"].values
         if axes.get_yscale() == "log":
-            mean, low = np.where(mean > 0.0, mean, np.nan), np.where(low > 0.0, low, 1e-2 * mean)
-        axes.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0.0)
-        if x.size == 1:
-            axes.errorbar(x, mean, [mean - low, high - mean], fmt="none", ecolor=colour, elinewidth=0.9, capsize=3)
+            mean = np.where(mean > 0.0, mean, np.nan)
+        _draw_band(axes, curve, (x, mean), "conductivity_ci", colour, 0.22)
         axes.plot(x, mean, marker=marker, color=colour, markersize=4.5, linewidth=1.6, zorder=3)
         blocked = curve["percolating_fraction"].values < 1.0  # hollow: the mean holds realizations without a path
         if blocked.any():
@@ -199,6 +196,21 @@ def _draw_simulation(axes: Axes, part: xarray.Dataset, axis: _Axis) -> None:
             field = curve["model_conductivity"].sel({"model": MEAN_FIELD}).values
             shade = GREY if axis.curves == "method" else colour  # it is the same for all methods
             axes.plot(x, field, linestyle=(0, (4, 2)), color=shade, linewidth=0.9, zorder=2)
+        if bool(curve["method_error"].notnull().any()):
+            _draw_band(axes, curve, (x, mean), "band", colour, 0.12)
+
+
+def _draw_band(
+    axes: Axes, curve: xarray.Dataset, line: tuple[NDArray[Any], NDArray[Any]], name: str, colour: str, alpha: float
+) -> None:
+    """A band about a curve, between the variables of that name with _low and _high; a bar at a single point."""
+    x, mean = line
+    low, high = curve[f"{name}_low"].values, curve[f"{name}_high"].values
+    if axes.get_yscale() == "log":
+        low = np.where(low > 0.0, low, 1e-2 * mean)
+    axes.fill_between(x, low, high, color=colour, alpha=alpha, linewidth=0.0)
+    if x.size == 1:
+        axes.errorbar(x, mean, [mean - low, high - mean], fmt="none", ecolor=colour, elinewidth=0.9, capsize=3)
 
 
 def _drawn(part: xarray.Dataset) -> list[str]:
@@ -286,6 +298,8 @@ def _notes(comparison: xarray.Dataset) -> str:
     diagonal = "$k_{xx}$ and $k_{yy}$" if comparison.attrs["dimension"] == 2 else "$k_{xx}$, $k_{yy}$ and $k_{zz}$"
     mean = f"the mean of {diagonal}"
     notes = [f"Bands: {100 * level:g} % Student-t interval of {mean}, {number} realizations."]
+    if bool(comparison["method_error"].notnull().any()):
+        notes.append("Wide pale bands: and the estimated error of the method, of the discretization too.")
     zero = [
         SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
     ]
