@@ -8,6 +8,7 @@ import numpy as np
 
 from etc_engine.comparison.simulation import current_study
 from etc_engine.materials import accommodation_from_masses, find_solid, gas_state, jump_length
+from etc_engine.realization import Status
 
 if TYPE_CHECKING:
     import xarray
@@ -25,7 +26,8 @@ def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     -------
     dict of DataArray
         ``diameter`` [m]: of the sphere (disk) of the mean volume (area), of packings in files that of the first.
-        ``coordination``: mean over realizations. ``temperature`` [K], ``emissivity`` and ``jump_length`` [m] of one
+        ``coordination``: contacts of a particle, mean over the realizations that have a conductivity; links through
+        pores do not count. ``temperature`` [K], ``emissivity`` and ``jump_length`` [m] of one
         surface where the study says them; an emissivity of 0 beside a gas without radiation.
     """
     import xarray
@@ -38,7 +40,8 @@ def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     files = "sources" in study["packing"]  # of these the box of the first is known
     volume = volumes.isel(realization=0, drop=True) if files else volumes.mean("realization")
     found["diameter"] = 2.0 * (volume / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension)
-    found["coordination"] = 2.0 * (dataset["contacts"] / particles).mean("realization")
+    valid = dataset["status"] <= int(Status.NOT_PERCOLATING)
+    found["coordination"] = dataset["coordination"].where(valid).mean("realization")
     for name in ("temperature", "emissivity"):
         if name in dataset.coords:
             found[name] = dataset[name].reset_coords(drop=True)

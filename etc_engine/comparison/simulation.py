@@ -215,7 +215,8 @@ def simulated(dataset: xarray.Dataset) -> xarray.Dataset:
     result["half_width"] = 0.5 * (high - low)
     result["conductivity_ci_low"] = low
     result["conductivity_ci_high"] = high
-    _add_band(result, (samples * dataset["model_error_estimate"]).mean("realization"))
+    estimate = dataset["model_error_estimate"] if "model_error_estimate" in dataset else samples * np.nan
+    _add_band(result, (samples * estimate).mean("realization"))
     result["percolating_fraction"] = fraction
     result["count"] = count
     result["solid_fraction"] = dataset["solid_fraction"].mean("realization")

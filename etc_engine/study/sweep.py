@@ -19,6 +19,7 @@ from etc_engine.realization import ENGINES, Conduction, RealizationSpec
 from etc_engine.study.conditions import check_conditions
 from etc_engine.study.files import A_SEED, SCHEMA, Seed, StudyFile, parse_toml, read_text, validated
 from etc_engine.study.meaning import MEANING, OPTIONS, drop_meaningless, meaningless, refuse_meaningless
+from etc_engine.study.model_inputs import check_models
 from etc_engine.study.quantities import QUANTITIES, value_of
 from etc_engine.study.tables import (
     ConductionTable,
@@ -70,6 +71,7 @@ class Study(StudyFile):
             raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
         refuse_meaningless(self)
         check_conditions(self)
+        check_models(self)
         if not engine.needs_contacts:
             self._check_cell()
         densest = max((density for density in self.densities if density is not None), default=0.0)

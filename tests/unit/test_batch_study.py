@@ -108,6 +108,20 @@ def test_without_density_the_packer_decides():
         ("box =", "count = 100\nbox =", ("packing", "count", "advancing-front")),
         ("uniform:0.01:0.02", "equal", ("packing", "radii", "equal:0.01")),
         ("[statistics]", '[models]\nnames = ["maxwel"]\n[statistics]', ("models", "maxwel", "did you mean maxwell")),
+        *(
+            ("[statistics]", f'[models]\nnames = ["{name}"]\n[statistics]', ("models.names", repr(name), *words))
+            for name, words in {
+                "kunii_smith": ("holds in 3D", "packing.box = [1.0, 1.0]"),
+                "hasselman_johnson": ("needs radius (inclusion radius), interface_conductance", "take it out"),
+                "lewis_nielsen": ("needs k1 (conductivity of the matrix) in (0, inf), found 0",),
+            }.items()
+        ),
+        (
+            '[contacts]\nrule = "bonded"\ncontact_angle = [10.0, 2.5]\n',
+            '[models]\nnames = ["contact_mean_field"]\n[pores]\nconductivity = 0.1\n[conduction]\nengine = "voxel"\n'
+            "resolution = 400\n",
+            ("models.names", "'contact_mean_field' is of contact networks, engine 'voxel' has none"),
+        ),
         ("schema = 2", "schema = = 2", ("not valid TOML", "line 2")),
     ],
 )

@@ -161,11 +161,15 @@ def test_models_with_parameters_and_models_without_a_value(made_sweep):
     assert array.isnull().values.tolist() == [False, False, False, True, True]  # touching at pi/4
     assert "must lie in [0, 0.785398)" in str(result["model_note"].sel({"model": "square_array"}).item())
     insulated = evaluate_models(made_sweep(OVERLAP, noisy), ["lewis_nielsen", "russell", "kirkpatrick"])
-    assert insulated["model_conductivity"].sel({"model": ["lewis_nielsen", "russell", "kirkpatrick"]}).isnull().all()
+    assert insulated["model_conductivity"].sel({"model": ["lewis_nielsen", "russell"]}).isnull().all()
+    # the coordination number of the sweep is 3.5
+    values = insulated["model_conductivity"].sel({"model": "kirkpatrick"})
+    expected = evaluate("kirkpatrick", k1=0.0, k2=2.0, fraction=dataset["density"], dimension=2, coordination=3.5)
+    assert np.allclose(values, expected)
     notes = dict(zip(insulated["model"].values, insulated["model_note"].values, strict=True))
     assert "k1 of model lewis_nielsen" in notes["lewis_nielsen"]
     assert "dimension 3" in notes["russell"]
-    assert "coordination" in notes["kirkpatrick"]
+    assert notes["kirkpatrick"] == ""
 
 
 def test_refusals(made_sweep):
