@@ -7,6 +7,7 @@ import errno
 import json
 import logging
 import sqlite3
+from collections import Counter
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -98,8 +99,7 @@ def distinct_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """
     found = dict(pairs)
     if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
+        twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
         raise InputError(f"the key {twice[:80]!r} is given twice in a JSON object, expected once")
     return found
 

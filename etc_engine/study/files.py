@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,6 +39,15 @@ MOVED = {
 
 OLD_WORDS = {"dirichlet": "fixed", "neumann": "flux"}
 """Words of schema 1 for a wall or an edge, and those of today."""
+
+
+MOST_PARTS = 8
+LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{MOST_PARTS}}}")
+OPAQUE = re.compile(
+    r'"""(?:\\.|[^\\])*?(?:"""|\Z)' r"|'''.*?(?:'''|\Z)" r'|"(?:\\.|[^"\\\n])*(?:"|$)' r"|'[^'\n]*(?:'|$)|#[^\n]*",
+    re.DOTALL | re.MULTILINE,
+)
+"""Strings and comments of TOML, unfinished ones to their end: the time of the search is linear in the text."""
 
 
 def _number_of_schema(value: object) -> object:
@@ -117,6 +127,7 @@ def parse_toml(text: str, source: str = "study") -> dict[str, Any]:
     Traceback (most recent call last):
     etc_engine.errors.StudyError: s.toml: is not valid TOML: ...
     """
+    _refuse_long_keys(text, source)
     try:
         content = tomllib.loads(text)
     except RecursionError:
@@ -127,6 +138,26 @@ def parse_toml(text: str, source: str = "study") -> dict[str, Any]:
     if schema == 1 and not isinstance(schema, bool):
         raise StudyError(f"{source}: schema: found 1, allowed: {SCHEMA}; write {_translation(content)}")
     return content
+
+
+def _refuse_long_keys(text: str, source: str) -> None:
+    """Refuse keys of many dotted parts before the parser sees them: its time and memory grow with their square.
+
+    Examples
+    --------
+    >>> _refuse_long_keys("a = '1.2.3.4.5.6.7.8.9.10' # 1.2.3.4.5.6.7.8.9.10", "s.toml")
+    >>> _refuse_long_keys("a.'b'.c.d.e.f.g.h.i = 1", "s.toml")
+    Traceback (most recent call last):
+    etc_engine.errors.StudyError: s.toml: is not valid: line 1 has a key of more than 8 parts, a study has keys of 3 ...
+    """
+    bare = OPAQUE.sub(lambda found: "" if found[0].startswith("#") else "s" + "\n" * found[0].count("\n"), text)
+    found = LONG_KEY.search(bare)
+    if found:
+        line = bare.count("\n", 0, found.start()) + 1
+        raise StudyError(
+            f"{source}: is not valid: line {line} has a key of more than {MOST_PARTS} parts, "
+            "a study has keys of 3 at most"
+        )
 
 
 def validated(content: Mapping[str, Any], kind: type[S], source: str = "study") -> S:

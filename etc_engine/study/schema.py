@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from itertools import pairwise
@@ -14,6 +15,9 @@ LARGEST, SMALLEST = 1e100, 1e-100
 """No quantity in SI units lies beyond these; products of three of them are still finite."""
 MOST_STEPS = 10**9
 """A run of more steps than this has a mistake in its study: each takes a microsecond or more."""
+
+LONGEST_KEY = 80
+"""Characters of a key that an error shows."""
 
 NUMBER = "a number of at most 1e100 in size"
 POSITIVE = "a positive number from 1e-100 to 1e100"
@@ -35,7 +39,7 @@ class StudyTable(BaseModel):
 
 def without_repeats(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """The values, refused if one stands twice."""
-    repeated = [value for value in dict.fromkeys(values) if values.count(value) > 1]
+    repeated = [value for value, count in Counter(values).items() if count > 1]
     if repeated:
         raise ValueError(f"{repeated[0]!r} is listed twice, each value may stand once")
     return values
@@ -134,7 +138,8 @@ def _field(root: type[BaseModel], location: Sequence[int | str]) -> tuple[str, t
         if inner is None:
             continue
         table = inner
-        place += f".{step}" if place else step
+        name = step if len(step) <= LONGEST_KEY else f"{step[:LONGEST_KEY]}..."
+        place += f".{name}" if place else name
         field = next((f for n, f in table.model_fields.items() if step in (n, f.alias)), None)
         if field is None:  # an unknown key
             break

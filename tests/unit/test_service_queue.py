@@ -55,6 +55,31 @@ def test_studies_leave_the_queue_in_the_order_they_came(queue):
     assert [entry.id for entry in queue.entries("queued", limit=1, offset=1)] == ["b"]
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["a{} = 1", "[a{}]", "x = {{ a{} = 1 }}", "'q'{} = 1", 'a = """\\""""\nb{} = 1'],
+    ids=("key", "table", "inline", "quoted", "string"),
+)
+@pytest.mark.parametrize("part", [".a", " . a", ".'a b'", '."a"'])
+def test_keys_of_many_parts_are_refused_before_they_are_parsed(text, part):
+    """The parser needs 18 s and 4 GB for 32 000 parts."""
+    with pytest.raises(StudyError, match="has a key of more than 8 parts"):
+        apply(text.format(part * 10_000), Limits())
+
+
+@pytest.mark.parametrize("text", ["name = 'a{}'", 'name = "a{}"', "# a{}", "name = '''\na{}'''", 'name = """\na{}"""'])
+def test_dots_in_words_and_comments_are_no_parts_of_keys(text):
+    with pytest.raises(StudyError) as caught:
+        apply(text.format(".a" * 50), Limits())
+    assert "parts" not in str(caught.value)
+
+
+def test_a_long_key_is_cut_in_the_error():
+    with pytest.raises(StudyError, match="unknown key") as caught:
+        apply("[packing]\n" + "radi" * 16_000 + " = 1", Limits())
+    assert len(str(caught.value)) < 400
+
+
 def test_memory_is_told_in_the_unit_of_the_option():
     with pytest.raises(StudyError, match=r"this service allows 8192 MB$"):
         apply(STUDY.replace("box = [1.0, 1.0]", "box = [100000.0, 1.0]"), replace(Limits(), particles=10**9))
