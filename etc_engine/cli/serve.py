@@ -72,6 +72,7 @@ def serve_command(
         raise InputError(
             f"the service needs {error.name}: install the extra with pip install 'etc-engine[service]'"
         ) from None
+    from etc_engine.service.accounts import exposures
     from etc_engine.service.launchers import find_mpiexec
     from etc_engine.service.settings import Limits, Settings
     from etc_engine.service.token import read_token, readable_by_others
@@ -98,7 +99,12 @@ def serve_command(
         click.echo(f"etc-engine: others can read the token in {token_file}: chmod 600 {token_file}", err=True)
     if settings.launcher == "local" and ranks > 1 and find_mpiexec() is None:
         click.echo("etc-engine: no mpiexec is found: studies run on one process (extra 'mpi')", err=True)
-    serve(settings, lambda address: click.echo(f"etc-engine: serving {data} on {address}", err=True))
+
+    def ready(address: str) -> None:
+        for line in (*exposures(settings), f"serving {data} on {address}"):
+            click.echo(f"etc-engine: {line}", err=True)
+
+    serve(settings, ready)
 
 
 def _words(text: str) -> tuple[str, ...]:

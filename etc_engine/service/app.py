@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
+import sqlite3
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from typing import Annotated, Any, Literal
@@ -17,7 +20,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from etc_engine.durable.provenance import engine_version
-from etc_engine.errors import InputError, StudyError
+from etc_engine.errors import InputError, OutputError, StudyError
 from etc_engine.models import CATALOGUE
 from etc_engine.models.catalogue import find_model
 from etc_engine.models.records import evaluation, record
@@ -26,6 +29,7 @@ from etc_engine.realization import ENGINES
 from etc_engine.service.admission import SOURCE, apply, toml_of
 from etc_engine.service.curve import plain
 from etc_engine.service.guard import Guard
+from etc_engine.service.held import EngineError
 from etc_engine.service.live import LiveResults, log_tail
 from etc_engine.service.messages import (
     About,
@@ -38,7 +42,8 @@ from etc_engine.service.messages import (
     StudySummary,
     Submitted,
 )
-from etc_engine.service.queue import Entry, Queue, State
+from etc_engine.service.queue import LOCKED_SECONDS, Entry, Queue, State
+from etc_engine.service.reading import Finished
 from etc_engine.service.refusals import (
     PARTICLES_BODY,
     REFUSALS,
@@ -51,6 +56,7 @@ from etc_engine.service.refusals import (
 from etc_engine.service.running import Runner
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
+from etc_engine.service.supervisor import damaged
 from etc_engine.study.sweep import study_schema
 
 PAGE = {
@@ -80,7 +86,25 @@ class Service:
     live: LiveResults
     runner: Runner
     wake: Callable[[], None]
-    changing: threading.Lock = field(default_factory=threading.Lock)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def spoil(self, study: str, error: OutputError) -> None:
+        """The result of a study turned out to be damaged."""
+        with self.changing():
+            entry = self.queue.get(study)
+            if entry is not None and entry.state == "done":
+                self.queue.settle(study, "failed", damaged(error))
+                self.store.set_aside(study)
+
+    @contextmanager
+    def changing(self) -> Iterator[None]:
+        """One change of the queue and the folders at a time; see `Queue` for who else may hold it up."""
+        if not self._lock.acquire(timeout=LOCKED_SECONDS):
+            raise sqlite3.OperationalError("database is locked")
+        try:
+            yield
+        finally:
+            self._lock.release()
 
 
 def _finite(value: float | None) -> float | None:
@@ -199,7 +223,7 @@ def remove_study(request: Request, study: Id) -> None:
     """Forget a study and all its files; one that runs has to be cancelled first."""
     service = _service(request)
     _entry(request, study)
-    with service.changing:
+    with service.changing():
         if not service.queue.remove(study):
             raise HTTPException(409, "the study is running: cancel it first")
         service.store.remove(study)
@@ -240,27 +264,30 @@ def study_text(request: Request, study: Id) -> Response:
 async def study_curve(request: Request, study: Id) -> Response:
     """Conductivity over density with confidence intervals and models: complete, or of the realizations so far."""
     _entry(request, study)
-    live = _service(request).live
-    answer = live.fresh_curve(study) or await run_in_threadpool(live.curve, study)
+    service = _service(request)
+    if service.store.result(study).exists():
+        return Response((await _finished(request, study)).curve, media_type="application/json")
+    answer = service.live.fresh_curve(study) or await run_in_threadpool(service.live.growing_curve, study)
     return Response(answer, media_type="application/json")
 
 
 @api.head("/studies/{study}/result.nc", include_in_schema=False)
 @api.get("/studies/{study}/result.nc", response_class=FileResponse)
-def study_result(request: Request, study: Id) -> FileResponse:
-    """The result as netCDF."""
-    name = f"{_finished(request, study)}.nc"
-    return FileResponse(_service(request).store.result(study), media_type="application/x-netcdf", filename=name)
+async def study_result(request: Request, study: Id) -> FileResponse:
+    """The result as netCDF, read once before it is handed out."""
+    await _require_result(request, study)
+    path = _service(request).store.result(study)
+    return FileResponse(path, media_type="application/x-netcdf", filename=f"{study}.nc")
 
 
 @api.head("/studies/{study}/report.html", include_in_schema=False)
 @api.get("/studies/{study}/report.html", response_class=FileResponse)
-def study_report(request: Request, study: Id) -> FileResponse:
+async def study_report(request: Request, study: Id) -> FileResponse:
     """The report as one HTML page; it is made when it is first asked for."""
-    name = f"{_finished(request, study)}.html"
-    report = _service(request).runner.report(study)
+    await _require_result(request, study)
+    report = await run_in_threadpool(_service(request).runner.report, study)
     headers = {"content-security-policy": REPORT_POLICY}
-    return FileResponse(report, media_type="text/html", filename=name, headers=headers)
+    return FileResponse(report, media_type="text/html", filename=f"{study}.html", headers=headers)
 
 
 @api.post("/solve", openapi_extra=PARTICLES_BODY)
@@ -331,12 +358,24 @@ def page_file(name: Literal["app.js", "figure.js", "form.js", "style.css", "icon
     return Response(files(__package__).joinpath("page", name).read_bytes(), media_type=PAGE[name])
 
 
-def _finished(request: Request, study: str) -> str:
-    """The id as a file name, of a study that is done."""
+async def _require_result(request: Request, study: str) -> None:
+    """Refuse a study that is not done, or whose result is damaged."""
     entry = _entry(request, study)
     if entry.state != "done":
         raise HTTPException(409, f"the study is {entry.state}: its result is there when it is done")
-    return study
+    await _finished(request, study)
+
+
+async def _finished(request: Request, study: str) -> Finished:
+    """What is in a result file; a study that was done and whose file is damaged becomes failed."""
+    service = _service(request)
+    try:
+        return await asyncio.shield(asyncio.wrap_future(service.live.finished(study)))
+    except EngineError:
+        raise
+    except OutputError as error:
+        await run_in_threadpool(service.spoil, study, error)
+        raise HTTPException(409, f"the study has failed: {damaged(error)}") from None
 
 
 def _submit(service: Service, text: str) -> tuple[Entry, bool]:
@@ -345,7 +384,7 @@ def _submit(service: Service, text: str) -> tuple[Entry, bool]:
     One that was cancelled or has failed continues.
     """
     found = apply(text, service.settings.limits)
-    with service.changing:
+    with service.changing():
         known = service.queue.get(found.id)
         if known is None:
             service.store.save_study(found.id, text)

@@ -1,21 +1,31 @@
-"""The queue: studies and their states in an SQLite file, safe from kills at any moment (write-ahead log)."""
+"""The queue: studies and their states in an SQLite file, safe from kills at any moment (write-ahead log).
+
+Reads have a connection of their own: while another program holds the file, only changes wait, and give up soon.
+"""
 
 from __future__ import annotations
 
+import re
 import sqlite3
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from etc_engine.durable.files import sync_folder
 from etc_engine.durable.provenance import now
 from etc_engine.errors import InputError, OutputError
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 STATES: tuple[State, ...] = get_args(State)
+LOCKED_SECONDS = 3.0
+"""Seconds that a change waits for another program that holds the file."""
+REPAIR = "put a copy of it back, or move it and the folder studies away and hand the studies in again"
 SCHEMA = """
-CREATE TABLE IF NOT EXISTS studies (
+CREATE TABLE studies (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     id TEXT NOT NULL UNIQUE,
     name TEXT NOT NULL,
@@ -33,7 +43,7 @@ CREATE TABLE IF NOT EXISTS studies (
     batch TEXT NOT NULL DEFAULT '',
     place REAL NOT NULL
 );
-CREATE INDEX IF NOT EXISTS by_state ON studies (state, place);
+CREATE INDEX by_state ON studies (state, place);
 """
 
 
@@ -72,37 +82,61 @@ class Queue:
     Parameters
     ----------
     path : Path
-        The SQLite file, made if it is not there.
+        The SQLite file, made whole if it is not there.
     limit : int
         Most studies that may wait.
 
     Raises
     ------
     OutputError
-        If the file is damaged or cannot be written.
+        If the file is empty or damaged, or cannot be written.
+
+    Notes
+    -----
+    Changes raise ``sqlite3.OperationalError`` ("database is locked") if another program holds the file for longer than
+    `LOCKED_SECONDS`. Reads never wait for it.
 
     Examples
     --------
-    >>> queue = Queue(Path(":memory:"))
-    >>> entry, new = queue.submit("a1", "first", 10, 10)
-    >>> entry.state, new, queue.submit("a1", "first", 10, 10)[1]
-    ('queued', True, False)
-    >>> queue.close()
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     queue = Queue(Path(folder) / "queue.sqlite")
+    ...     entry, new = queue.submit("a1", "first", 10, 10)
+    ...     print(entry.state, new, queue.submit("a1", "first", 10, 10)[1])
+    ...     queue.close()
+    queued True False
     """
 
     def __init__(self, path: Path, limit: int = 10_000) -> None:
-        self._limit, self._guard = limit, threading.RLock()
+        self._limit, self._guard, self._looking = limit, threading.RLock(), threading.Lock()
         try:
-            self._base = sqlite3.connect(path, timeout=30.0, isolation_level=None, check_same_thread=False)
+            if not path.exists():
+                _create(path)
+            elif path.stat().st_size == 0:
+                raise OutputError(f"queue {path}: is empty (0 bytes), expected the studies of this service: {REPAIR}")
+            self._base = _connect(path, LOCKED_SECONDS)
+            self._reader = _connect(path, 0.0)
+            self._check(path)
             self._base.execute("PRAGMA journal_mode=WAL")
             self._base.execute("PRAGMA synchronous=FULL")
-            self._base.executescript(SCHEMA)
         except sqlite3.Error as error:
-            raise OutputError(f"queue {path}: {error}") from None
+            raise OutputError(f"queue {path}: {error}: {REPAIR}") from None
+        except OSError as error:
+            raise error if isinstance(error, OutputError) else OutputError(f"queue {path}: {error.strerror}") from None
+
+    def _check(self, path: Path) -> None:
+        """Refuse a file with a damaged page, or with an entry that this module never wrote."""
+        problem = str(self._reader.execute("PRAGMA integrity_check(1)").fetchone()[0])
+        if problem != "ok":
+            raise OutputError(f"queue {path}: is damaged ({' '.join(problem.split())}): {REPAIR}")
+        for entry in self.entries(limit=-1):
+            if entry.state not in STATES or not re.fullmatch("[0-9a-z]+", str(entry.id)):
+                raise OutputError(f"queue {path}: is damaged (study {entry.number}): {REPAIR}")
 
     def close(self) -> None:
         """Close the file."""
-        with self._guard:
+        with self._guard, self._looking:
+            self._reader.close()
             self._base.close()
 
     def submit(self, study: str, name: str, planned: int, most: int) -> tuple[Entry, bool]:
@@ -113,7 +147,7 @@ class Queue:
         InputError
             If the queue is full.
         """
-        with self._guard:
+        with self._changing():
             known = self.get(study)
             if known is not None:
                 return known, False
@@ -145,8 +179,8 @@ class Queue:
     def count(self, state: State | None = None) -> int:
         """Number of studies, or of those in a state."""
         where, values = (" WHERE state = ?", (state,)) if state else ("", ())
-        with self._guard:
-            return int(self._base.execute(f"SELECT COUNT(*) FROM studies{where}", values).fetchone()[0])
+        with self._looking:
+            return int(self._reader.execute(f"SELECT COUNT(*) FROM studies{where}", values).fetchone()[0])
 
     def first_waiting(self, later: frozenset[str] = frozenset()) -> Entry | None:
         """The study that waits longest, but for those that are to be tried later."""
@@ -199,7 +233,7 @@ class Queue:
 
     def cancel(self, study: str) -> bool:
         """Ask for the end of a study; returns False if it is neither waiting nor running."""
-        with self._guard:
+        with self._changing():
             waiting = self._do(
                 "UPDATE studies SET state = 'cancelled', reason = 'cancelled', ended = ? "
                 "WHERE id = ? AND state = 'queued'",
@@ -224,12 +258,36 @@ class Queue:
         return bool(self._do("DELETE FROM studies WHERE id = ? AND state != 'running'", (study,)))
 
     def _ask(self, rest: str, values: tuple[Any, ...]) -> list[Entry]:
-        with self._guard:
-            rows = self._base.execute(f"SELECT {COLUMNS} FROM studies {rest}", values).fetchall()
+        with self._looking:
+            rows = self._reader.execute(f"SELECT {COLUMNS} FROM studies {rest}", values).fetchall()
         named = [dict(zip(NAMES, row, strict=True)) for row in rows]
         return [Entry(**{**values, "cancelling": bool(values["cancelling"])}) for values in named]
 
     def _do(self, statement: str, values: tuple[Any, ...]) -> int:
         """Change something; returns how many studies it concerned."""
-        with self._guard:
+        with self._changing():
             return self._base.execute(statement, values).rowcount
+
+    @contextmanager
+    def _changing(self) -> Iterator[None]:
+        """One change at a time; none waits for long behind others that wait for another program."""
+        if not self._guard.acquire(timeout=LOCKED_SECONDS):
+            raise sqlite3.OperationalError("database is locked")
+        try:
+            yield
+        finally:
+            self._guard.release()
+
+
+def _connect(path: Path, patience: float) -> sqlite3.Connection:
+    return sqlite3.connect(path, timeout=patience, isolation_level=None, check_same_thread=False)
+
+
+def _create(path: Path) -> None:
+    """Make an empty queue under another name first: a file without a table is never taken for one."""
+    draft = path.with_name(f"{path.name}.new")
+    draft.unlink(missing_ok=True)
+    with closing(_connect(draft, LOCKED_SECONDS)) as base:
+        base.executescript(SCHEMA)
+    draft.replace(path)
+    sync_folder(path.parent)

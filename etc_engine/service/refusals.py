@@ -19,8 +19,9 @@ from starlette.requests import ClientDisconnect
 from etc_engine.errors import EtcError, InputError, StudyError
 from etc_engine.service.admission import field_of, toml_of
 from etc_engine.service.client import IDENTITY
+from etc_engine.service.held import EngineError
 from etc_engine.service.messages import Problem
-from etc_engine.service.running import BusyError, EngineError
+from etc_engine.service.running import BusyError
 from etc_engine.study.sweep import EXAMPLE
 
 log = logging.getLogger("etc_engine.service")
@@ -56,6 +57,7 @@ REFUSALS: dict[int | str, dict[str, Any]] = {
     413: {"model": Problem, "description": "too long"},
     422: {"model": Problem, "description": "refused, in the words of the command line"},
     429: {"model": Problem, "description": "too many requests of this kind are waiting"},
+    503: {"model": Problem, "description": "another program holds the queue"},
 }
 
 
@@ -169,5 +171,7 @@ def _disk_is_full(error: Exception) -> bool:
 def _report_failure(_request: Request, error: Exception) -> Response:
     if _disk_is_full(error) or (isinstance(error, sqlite3.Error) and "full" in str(error)):
         return _problem(507, "the disk of the service is full: nothing was changed, try again when there is room")
+    if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
+        return _problem(503, "another program holds the queue of the service: nothing was changed, try again later")
     log.error("unexpected %s: %s", type(error).__name__, error, exc_info=error)
     return _problem(500, f"unexpected {type(error).__name__} in the service, see its log")

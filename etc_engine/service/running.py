@@ -3,36 +3,26 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
 import tempfile
 import threading
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from etc_engine.errors import InputError, OutputError
+from etc_engine.errors import InputError
 from etc_engine.particle_files.formats import CSV, DUMP, format_to_read
-from etc_engine.service.launchers import HELD, batch_environment
+from etc_engine.service.held import Held, run_held
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
-from etc_engine.service.supervisor import last_line
 
 UPLOAD = "upload"
 """The name every uploaded file gets; what its owner called it is nobody's business."""
-REFUSED = 2
 REPORT_SECONDS = 600.0
 
 
 class BusyError(InputError):
     """More requests of a kind wait than the service takes."""
-
-
-class EngineError(OutputError):
-    """A command of the engine ended in a way it should not."""
 
 
 @dataclass
@@ -90,39 +80,6 @@ class Runner:
         return page
 
     def _run(self, line: Sequence[str], folder: Path, seconds: float, good: Sequence[int] = (0,)) -> tuple[str, str]:
-        """Output and errors of a command.
-
-        Raises
-        ------
-        InputError
-            With the command's own line if it refuses.
-        EngineError
-            If it fails in another way.
-        """
-        memory = self.settings.limits.memory_bytes
-        with subprocess.Popen(
-            ["/bin/sh", "-c", HELD, "sh", str(memory // 1024), *self.settings.engine, *line],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-            cwd=folder,
-            env=batch_environment(),
-            encoding="utf-8",
-            errors="replace",
-        ) as running:
-            try:
-                printed, said = running.communicate(timeout=seconds)
-            except subprocess.TimeoutExpired:
-                with suppress(ProcessLookupError):
-                    os.killpg(running.pid, signal.SIGKILL)
-                running.communicate()
-                raise InputError(f"it took longer than {seconds:g} s, which is all this service allows") from None
-        if running.returncode in good:
-            return printed, said
-        reason = last_line(said)
-        if running.returncode == REFUSED:
-            raise InputError(reason)
-        if "MemoryError" in said or "allocat" in said:
-            raise InputError(f"it takes more than {memory / 1e6:.0f} MB of memory, which is all this service allows")
-        raise EngineError(reason or f"{line[0]} ended with status {running.returncode}")
+        """Output and errors of a command of the engine: see `run_held`."""
+        held = Held(seconds, self.settings.limits.memory_bytes)
+        return run_held([*self.settings.engine, *line], folder, held, good)

@@ -44,14 +44,13 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     """
     check_access(settings)
     check_launcher(settings)
-    import netCDF4  # noqa: F401 - loaded now, so that the first figure does not wait for it
-    import xarray  # noqa: F401
+    import xarray  # noqa: F401 - loaded now, so that the first figure does not wait for it
 
     logging.basicConfig(format="etc-engine: %(message)s", level=logging.WARNING)
     listener = _listen(settings)
     with listener, open_store(settings.data) as store:
         queue = Queue(store.database, settings.limits.waiting)
-        live = LiveResults(store)
+        live = LiveResults(store, settings.limits)
         supervisor = Supervisor(store, queue, make_launcher(store, settings), live, settings)
         service = Service(settings, store, queue, live, Runner(store, settings), supervisor.wake)
         config = uvicorn.Config(

@@ -1,4 +1,4 @@
-"""The data directory: one service at a time, a format that says its number, a folder a study.
+"""The data directory: one service at a time, a format that says its number, a folder a study, all for its owner alone.
 
 ::
 
@@ -6,7 +6,7 @@
     lock                     held by the running service (flock: gone with its process, however that ends)
     queue.sqlite             the queue
     scratch/                 uploads, emptied at every start
-    studies/<id>/            study.toml, log, result.nc (and its shards), report.html
+    studies/<id>/            study.toml, log, result.nc (and its shards), report.html; a damaged result.damaged.nc
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +28,9 @@ from etc_engine.sweep.shards import shard_folder
 FORMAT = 1
 FIRST = {"lock", "scratch", "studies"}
 """What a service that found no room for its format file has left."""
+PRIVATE = 0o077
+"""Rights that nobody but the owner gets."""
+DAMAGED = "result.damaged.nc"
 ROOM = 1 << 20
 """Bytes that have to fit on the disk for the service to start."""
 
@@ -72,6 +75,11 @@ class Store:
         """The report, once somebody has asked for it."""
         return self.folder(study) / "report.html"
 
+    def set_aside(self, study: str) -> None:
+        """Keep a damaged result under another name, so that the study can be computed again."""
+        with suppress(FileNotFoundError):
+            self.result(study).replace(self.folder(study) / DAMAGED)
+
     def save_study(self, study: str, text: str) -> None:
         """Make the folder of a study, with its text."""
         self.folder(study).mkdir(parents=True, exist_ok=True)
@@ -86,15 +94,29 @@ class Store:
 def open_store(root: Path) -> Iterator[Store]:
     """The data directory, made if it is not there, and held against a second service until the block ends.
 
+    Others than its owner are shut out, whatever rights it had; files that this process and its children make until the
+    block ends are for their owner alone.
+
     Raises
     ------
     OutputError
         If it is in use, of a newer format, something else, or cannot be written.
     """
     root = root.absolute()
+    mask = os.umask(PRIVATE)
+    try:
+        with _held(root) as store:
+            yield store
+    finally:
+        os.umask(mask)
+
+
+@contextmanager
+def _held(root: Path) -> Iterator[Store]:
     try:
         _check_kind(root)
         root.mkdir(parents=True, exist_ok=True)
+        root.chmod(0o777 & ~PRIVATE)
         handle = os.open(root / "lock", os.O_RDWR | os.O_CREAT, 0o600)
     except OutputError:
         raise
@@ -105,6 +127,8 @@ def open_store(root: Path) -> Iterator[Store]:
         store = Store(root)
         try:
             _prepare(store)
+        except OutputError:
+            raise
         except OSError as error:
             raise OutputError(f"data directory {root}: cannot be written ({error.strerror or error})") from None
         yield store
@@ -164,5 +188,11 @@ def _prepare(store: Store) -> None:
             os.fsync(stream.fileno())
     finally:
         probe.unlink(missing_ok=True)
+    known = [path.name for path in (store.root / "studies").iterdir()]
+    if known and not store.database.exists():
+        raise OutputError(
+            f"data directory {store.root}: {store.database.name} is missing, but there are {len(known)} studies: "
+            "put a copy of it back, or move the folder studies away and hand the studies in again"
+        )
     if not (store.root / "format.json").exists():
         write_atomically(store.root / "format.json", json.dumps({"format": FORMAT}).encode())

@@ -10,25 +10,28 @@ import logging
 import sqlite3
 import threading
 import time
+from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from etc_engine.durable.provenance import now
-from etc_engine.errors import EtcError
+from etc_engine.errors import EtcError, OutputError
+from etc_engine.service.held import REFUSED, EngineError, last_line
 from etc_engine.service.launchers import Ended, Launcher
 from etc_engine.service.live import LiveResults, log_tail
 from etc_engine.service.queue import Entry, Queue
+from etc_engine.service.reading import Finished
 from etc_engine.service.settings import Settings
-from etc_engine.service.store import Store
+from etc_engine.service.store import DAMAGED, Store
 
 log = logging.getLogger("etc_engine.service")
 
 ATTEMPTS = 3
 """Starts without a single finished unit before a study counts as failed."""
-START, ENGINE = "== start", "etc-engine: "
-"""How a batch begins in the log of its study, and a line of the engine itself."""
+START = "== start"
+"""How a batch begins in the log of its study."""
 GRACE = 30.0
 """Seconds that a batch may take to end when it is asked to."""
-REFUSED = 2
 COUNT_SECONDS = 1.0
 RETRY_SECONDS = 1.0
 
@@ -42,6 +45,10 @@ class _Watch:
     counted: float = 0.0
     asked: float = 0.0
     reason: str = ""
+    batch: str = ""
+    ended: Ended | None = None
+    reading: Future[Finished] | None = None
+    misread: int = 0
 
 
 class Supervisor:
@@ -61,15 +68,11 @@ class Supervisor:
         self._live, self._limits = live, settings.limits
         self._watches: dict[str, _Watch] = {}
         self._later: dict[str, float] = {}
-        self._stopping, self._wake = threading.Event(), threading.Event()
+        self._stopping, self._wake, self._taken_up = threading.Event(), threading.Event(), False
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
 
     def start(self) -> None:
-        """Take up what an earlier service left running, and begin."""
-        for entry in self._queue.entries("running", limit=-1):
-            self._queue.forgive(entry.id)  # whatever ended it may have been the end of the service
-            if not entry.batch:
-                self._queue.set_batch(entry.id, self._launcher.find(entry.id))
+        """Begin, with what an earlier service left running."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -86,7 +89,8 @@ class Supervisor:
             while self._launcher.look(entry.id, entry.batch) is None and time.monotonic() < deadline:
                 time.sleep(0.05)
             self._launcher.kill(entry.id, entry.batch)
-            self._settle(entry, Ended())
+            with suppress(sqlite3.Error):  # the next service finds out what the end means
+                self._settle(entry, Ended(), self._watches.get(entry.id, _Watch()))
 
     def wake(self) -> None:
         """There is something new in the queue."""
@@ -107,30 +111,52 @@ class Supervisor:
 
     def _step(self) -> None:
         """Look once at every batch, and start the next ones if there is room."""
+        if not self._taken_up:
+            self._take_up()
         running = self._queue.entries("running", limit=-1)
         for entry in running:
             self._look_after(entry, self._watches.setdefault(entry.id, _Watch()))
         moment = time.monotonic()
         self._later = {study: until for study, until in self._later.items() if until > moment}
-        if len(running) < self._launcher.concurrent:
+        reading = sum(watch.ended is not None for watch in self._watches.values())
+        if len(running) - reading < self._launcher.concurrent:
             waiting = self._queue.first_waiting(frozenset(self._later))
             if waiting is not None:
                 self._launch(waiting)
                 self._wake.set()
 
+    def _take_up(self) -> None:
+        """Note what an earlier service could not note any more."""
+        for entry in self._queue.entries("running", limit=-1):
+            self._queue.forgive(entry.id)  # whatever ended it may have been the end of the service
+            if not entry.batch:
+                self._queue.set_batch(entry.id, self._launcher.find(entry.id))
+        self._taken_up = True
+
     def _launch(self, entry: Entry) -> None:
         """Start a batch; the queue knows before and after, so that a kill in between is noticed."""
         self._queue.begin(entry.id)
-        self._watches[entry.id] = _Watch()
+        watch = self._watches[entry.id] = _Watch()
         try:
             with self._store.log(entry.id).open("a") as file:
                 file.write(f"{START} {now()}\n")
-            self._queue.set_batch(entry.id, self._launcher.start(entry.id))
+            watch.batch = self._launcher.start(entry.id)
         except (OSError, EtcError) as error:
             self._try_again(self._queue.require(entry.id), str(error))
+        else:
+            self._queue.set_batch(entry.id, watch.batch)
 
     def _look_after(self, entry: Entry, watch: _Watch) -> None:
-        moment = time.monotonic()
+        if watch.ended is None:
+            self._look(entry, watch)
+        if watch.ended is not None and self._settle(self._queue.require(entry.id), watch.ended, watch):
+            self._watches.pop(entry.id, None)
+
+    def _look(self, entry: Entry, watch: _Watch) -> None:
+        """See whether a batch has ended, and end it where it should."""
+        moment, batch = time.monotonic(), watch.batch or entry.batch
+        if not entry.batch and batch:  # the queue was held by another program when the batch was started
+            self._queue.set_batch(entry.id, batch)
         if moment - watch.counted > COUNT_SECONDS:
             watch.counted = moment
             self._count(entry)
@@ -138,13 +164,12 @@ class Supervisor:
             watch.reason = self._reason_to_stop(entry, watch, moment)
             if watch.reason:
                 watch.asked = moment
-                self._launcher.stop(entry.id, entry.batch)
+                self._launcher.stop(entry.id, batch)
         elif moment - watch.asked > GRACE:
-            self._launcher.kill(entry.id, entry.batch)
-        ended = self._launcher.look(entry.id, entry.batch)
-        if ended is not None:
-            self._settle(self._queue.require(entry.id), ended, watch.reason)
-            self._watches.pop(entry.id, None)
+            self._launcher.kill(entry.id, batch)
+        watch.ended = self._launcher.look(entry.id, batch)
+        if watch.ended is not None and not self._launcher.outlives:
+            self._launcher.kill(entry.id, batch)  # ranks that have lost their launcher
 
     def _reason_to_stop(self, entry: Entry, watch: _Watch, moment: float) -> str:
         if entry.cancelling:
@@ -158,15 +183,13 @@ class Supervisor:
         if done > entry.done:
             self._queue.set_done(entry.id, done)
 
-    def _settle(self, entry: Entry, ended: Ended, reason: str = "") -> None:
-        """Decide what the end of a batch means."""
-        if not self._launcher.outlives:
-            self._launcher.kill(entry.id, entry.batch)  # ranks that have lost their launcher
+    def _settle(self, entry: Entry, ended: Ended, watch: _Watch) -> bool:
+        """Decide what the end of a batch means; returns False as long as its result is being read."""
         if self._store.result(entry.id).is_file():
-            self._finish(entry)
-        elif entry.cancelling or reason:
+            return not self._stopping.is_set() and self._finish(entry, watch)
+        if entry.cancelling or watch.reason:
             self._count(entry)
-            self._queue.settle(entry.id, "cancelled" if entry.cancelling else "failed", reason or "cancelled")
+            self._queue.settle(entry.id, "cancelled" if entry.cancelling else "failed", watch.reason or "cancelled")
         elif self._stopping.is_set():
             self._queue.put_back(entry.id, "")
         else:
@@ -177,15 +200,27 @@ class Supervisor:
             else:
                 code = "" if ended.status is None else f" with status {ended.status}"
                 self._try_again(self._queue.require(entry.id), said or f"its batch ended{code}, see the log")
+        return True
 
-    def _finish(self, entry: Entry) -> None:
-        """The result is there: complete, unless somebody has meddled with it."""
+    def _finish(self, entry: Entry, watch: _Watch) -> bool:
+        """The result is there: done, unless its file is damaged; returns False as long as that is not known."""
+        watch.reading = watch.reading or self._live.finished(entry.id)
+        if not watch.reading.done():
+            return False
         try:
-            units, failed_cells = self._live.outcome(entry.id)
-        except EtcError as error:
+            found = watch.reading.result()
+        except EngineError as error:  # no memory, say: nothing is wrong with the file
+            watch.reading, watch.misread = None, watch.misread + 1
+            if watch.misread < ATTEMPTS:
+                return False
             self._queue.settle(entry.id, "failed", str(error))
+        except OutputError as error:
+            self._queue.settle(entry.id, "failed", damaged(error))
+            self._store.set_aside(entry.id)
         else:
-            self._queue.finish(entry.id, units, failed_cells)
+            self._live.forget(entry.id)
+            self._queue.finish(entry.id, found.units, found.failed_cells)
+        return True
 
     def _try_again(self, entry: Entry, reason: str) -> None:
         """The study continues at once after progress, a little later without, and fails after three such starts."""
@@ -196,13 +231,6 @@ class Supervisor:
         self._queue.put_back(entry.id, reason)
 
 
-def last_line(text: str) -> str:
-    """The last thing the engine itself said in a log; empty if it said nothing.
-
-    Examples
-    --------
-    >>> last_line("etc-engine: cannot write shard: no space\\nPlease see the FAQ page\\n")
-    'cannot write shard: no space'
-    """
-    lines = [line for line in text.splitlines() if line.startswith(ENGINE)]
-    return lines[-1].removeprefix(ENGINE) if lines else ""
+def damaged(error: OutputError) -> str:
+    """Why a study has failed whose result is damaged, and what can be done."""
+    return f"{error}; the file is kept as {DAMAGED}, resume computes the study again"
