@@ -15,6 +15,7 @@ from typing import NoReturn
 
 import click
 
+from etc_engine.cli.streams import guarded_streams
 from etc_engine.cli.threads import hold_one_thread
 from etc_engine.errors import EtcError
 
@@ -88,8 +89,13 @@ def cli() -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Run one command line and answer its exit status; what goes wrong is one line on stderr."""
+    """Run one command line and return its exit status; what goes wrong is one line on stderr."""
     hold_one_thread()
+    with guarded_streams():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         status = cli.main(args=arguments, prog_name="etc-engine", standalone_mode=False)
     except click.UsageError as error:

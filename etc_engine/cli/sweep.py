@@ -199,7 +199,10 @@ def _foretell(study: Path, output: Path, communicator: Communicator, realize: Re
     click.echo(f"time      about {found.seconds(left):.3g} s on {found.ranks} rank{'s' * (found.ranks > 1)}")
     if found.most_units > found.units:
         click.echo(f"          at most about {found.seconds(found.most_units - found.finished):.3g} s")
-    click.echo(f"memory    {found.rank_bytes / 1e6:.0f} MB per rank")
+    click.echo(
+        f"memory    {found.rank_bytes / 1e6:.0f} MB per rank; rank 0 {found.gathered_bytes / 1e6:.2g} MB more, for the "
+        "results of all units"
+    )
     click.echo(f"disk      {found.shard_bytes / 1e6:.2g} MB of shards, {found.dataset_bytes / 1e6:.2g} MB of result")
     for packing in found.packings:
         click.echo(f"packing   {packing}")

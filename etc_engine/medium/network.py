@@ -19,6 +19,10 @@ from etc_engine.packing.particles import ParticlePacking
 LARGEST = 1e100
 """Of a resistance: products of a few of them stay finite."""
 
+NARROWEST = float(np.radians(1e-6)) * (1.0 - 1e-12)
+"""Smallest contact half-angle that is prescribed [rad]: on a particle of 1 mm the contact is narrower than an atom, and
+below it the method ``exact`` loses digits."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactNetwork:
@@ -191,14 +195,14 @@ def _resistances(values: ArrayLike, size: int) -> Floats:
 
 
 def check_half_angle(half_angle: float) -> None:
-    """Refuse a contact half-angle [rad] that does not lie between 0 and pi/2, both excluded.
+    """Refuse a contact half-angle [rad] below `NARROWEST`, or not below pi/2.
 
     Raises
     ------
     InputError
     """
-    if not (np.isfinite(half_angle) and 0.0 < half_angle < 0.5 * np.pi):
+    if not (np.isfinite(half_angle) and NARROWEST <= half_angle < 0.5 * np.pi):
         raise InputError(
-            f"the contact half-angle must lie between 0 and 90 degrees, both excluded, "
+            f"the contact half-angle must lie between {np.degrees(NARROWEST):g} and 90 degrees, 90 excluded, "
             f"found {np.degrees(half_angle):g} degrees"
         )

@@ -157,6 +157,7 @@ def radius_contacts(packing: ParticlePacking, contact_radius: float, bond_gap: f
         )
     network = bonded_contacts(packing, 0.1, bond_gap)
     angles = np.arcsin(contact_radius / packing.radii)
+    check_half_angle(float(angles.min()))
     return replace(network, angles=angles[network.pairs], wall_angles=angles[network.wall_particles], rule="radius")
 
 

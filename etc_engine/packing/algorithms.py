@@ -22,6 +22,10 @@ Progress = Callable[[float], None]
 """Called now and then with the fraction of the work that is done."""
 
 
+MOST_PARTICLES = 1e9
+"""More would take a terabyte."""
+
+
 @dataclass(frozen=True)
 class PackingSpec:
     """What a packing is to be like.
@@ -98,7 +102,22 @@ def pack(spec: PackingSpec, rng: np.random.Generator, progress: Progress | None 
     >>> round(pack(spec, np.random.default_rng(11)).density, 2)
     0.6
     """
+    _refuse_too_many(spec)
     return METHODS[spec.method](spec, rng, progress)
+
+
+def _refuse_too_many(spec: PackingSpec) -> None:
+    """Refuse more particles than any machine holds: most likely a radius or an edge in another unit."""
+    count: float
+    if spec.count is not None:
+        count, cure = spec.count, "ask for fewer"
+    elif spec.radii.scalable:
+        return
+    else:
+        count = (spec.density or 1.0) * spec.box.volume / spec.radii.mean_measure(spec.box.dimension)
+        cure = f"use larger radii than {spec.radii.mean:g} m or a smaller box"
+    if count > MOST_PARTICLES:
+        raise InputError(f"the packing would have about {count:.3g} particles, above {MOST_PARTICLES:g}: {cure}")
 
 
 def _scaled_sizes(spec: PackingSpec, rng: np.random.Generator) -> Floats:

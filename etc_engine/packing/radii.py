@@ -14,6 +14,11 @@ from etc_engine.errors import InputError
 GAUSSIAN_CUT = 3.0
 """A Gaussian distribution is truncated at this many standard deviations on either side of its mean."""
 
+SHORTEST, LONGEST = 1e-15, 1e15
+"""Radii that are no mistake in a unit, and whose areas and volumes are exact doubles [m]."""
+WIDEST_RANGE = 1e6
+"""Largest ratio of two radii of one distribution."""
+
 
 @dataclass(frozen=True)
 class RadiusDistribution:
@@ -157,6 +162,16 @@ def _check(radii: RadiusDistribution) -> None:
     spread = kind in ("gaussian", "lognormal")
     if min(lengths[:1] if spread else lengths) <= 0.0:
         raise InputError(f"size distribution {found!r} has a radius that is not positive: expected {form}")
+    for length in lengths[:1] if spread else lengths:
+        if not SHORTEST <= length <= LONGEST:
+            raise InputError(
+                f"size distribution {found!r} has the radius {length:g}: expected metres, from {SHORTEST:g} to {LONGEST:g}"
+            )
+    if not spread and max(lengths) > WIDEST_RANGE * min(lengths):
+        raise InputError(
+            f"size distribution {found!r} has radii of ratio {max(lengths) / min(lengths):.3g}: expected at most "
+            f"{WIDEST_RANGE:g}"
+        )
     if spread and numbers[1] <= 0.0:
         raise InputError(f"size distribution {found!r} has a standard deviation that is not positive: use equal:r")
     if kind == "uniform" and numbers[0] > numbers[1]:

@@ -157,7 +157,7 @@ def _failed_by_chance(reading: Future[Finished]) -> bool:
 
 def _grow(growing: _Growing) -> None:
     """Read what is new; make the answer again if there was anything."""
-    records = growing.reader.read(growing.reader.files())
+    records = list(growing.reader.read(growing.reader.files()))
     if records:
         growing.table = join([growing.table, tabulate(growing.study, records)])
     units = len(growing.table.rows)

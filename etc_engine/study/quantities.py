@@ -25,7 +25,7 @@ from etc_engine.study.schema import (
     without_repeats,
 )
 
-Angle = Annotated[float, Field(strict=True, gt=0.0, lt=90.0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=1e-6, lt=90.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 SHARE = "a number from 0 to 1"
 Accommodation = Annotated[float, Field(strict=True, gt=0.0, le=1.0)]
@@ -117,7 +117,7 @@ QUANTITIES: Mapping[str, Quantity] = {
             "contact half-angle",
             "contacts",
             Angle,
-            "a half-angle between 0 and 90 degrees, both excluded",
+            "a half-angle from 1e-6 to 90 degrees, 90 excluded",
             comment="half of the angle that the contact subtends at the centre of a particle; not a wetting angle",
             si=float(np.pi / 180.0),
         ),

@@ -20,8 +20,10 @@ from etc_engine.sweep.parts import Part, part_folders, take_up
 from etc_engine.sweep.shards import (
     SUFFIX,
     clear_folder,
+    frame,
     read_study_file,
     shard_folder,
+    unframe,
     write_study_file,
 )
 
@@ -98,7 +100,7 @@ def claim_output(
         take_up(place, folder if policy == "resume" else None, run)
     remarks = _other_engines(folder) if policy == "resume" and started else ()
     record = json.dumps(asdict(this_run(run, ranks, lock.holder.job)))
-    write_atomically(folder / f"{run}.run", record.encode())
+    write_atomically(folder / f"{run}.run", frame(record))
     return Claim(study, text, output, run, remarks=(*remarks, *study.remarks()), part=part)
 
 
@@ -108,8 +110,30 @@ def new_run() -> str:
 
 
 def recorded_runs(folder: Path) -> list[Run]:
-    """All runs that worked on an output, the first one first."""
-    return [Run(**json.loads(path.read_text())) for path in sorted(folder.glob("*.run"))]
+    """All runs that worked on an output, the first one first.
+
+    Raises
+    ------
+    OutputError
+        If the record of a run is damaged.
+    """
+    return [_read_run(path) for path in sorted(folder.glob("*.run"))]
+
+
+def _read_run(path: Path) -> Run:
+    """The record of a run: a line with its checksum; earlier versions wrote the text alone."""
+    try:
+        data = path.read_bytes()
+        text = unframe(data) or (data if data.startswith(b"{") else "")
+        run = Run(**json.loads(text))
+        if all(isinstance(value, int if name == "ranks" else str) for name, value in asdict(run).items()):
+            return run
+    except (OSError, ValueError, TypeError, RecursionError):
+        pass
+    raise OutputError(
+        f"{path}, the record of a former run, is damaged: remove it and continue with --resume (no number depends on "
+        "it), or start anew with --overwrite"
+    )
 
 
 def difference(found: Mapping[str, Any], wanted: Mapping[str, Any], prefix: str = "") -> str:
@@ -227,9 +251,9 @@ def refuse_other_study(study: Identified, digest: str, identity: Mapping[str, An
     found = {key: value for key, value in identity.items() if key in wanted}
     if isinstance(found.get("packing"), Mapping):  # where files are is no part of what they hold
         found["packing"] = {key: value for key, value in found["packing"].items() if key != "folder"}
+    what = difference(found, wanted) or "all keys are equal, its digest is not: it is damaged or of another version"
     raise StudyError(
-        f"{place} belongs to another study ({difference(found, wanted)}): "
-        "resume with that study, or start anew with --overwrite"
+        f"{place} belongs to another study ({what}): resume with that study, or start anew with --overwrite"
     )
 
 

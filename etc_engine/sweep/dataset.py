@@ -13,7 +13,7 @@ from etc_engine.study.conditions import derived_conductivities
 from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.statistics import interval, summarize
-from etc_engine.sweep.table import CELL_VARIABLES, MEASURES, UNIT_VARIABLES, Table
+from etc_engine.sweep.table import CELL_VARIABLES, MEASURES, UNIT_VARIABLES, WORD_FIELDS, Table
 
 if TYPE_CHECKING:
     import xarray
@@ -133,13 +133,11 @@ def _cell_values(study: Study, table: Table) -> Values:
     values["conductivity"] = np.full((*shape, d, d), np.nan)
     values["conductivity_bounds"] = np.full((*shape, d, 2), np.nan)
     values["status"] = np.full(shape, Status.NOT_RUN, np.int8)
+    values["message"] = np.full(shape, "", object)
     every: Any = (slice(None),) * len(cells)
     for name, grid in values.items():
-        grid[(rows["density_index"], *every, rows["realization"])] = rows[name]
-    values["message"] = np.full(shape, "", object)
-    for (i, r, place), text in table.messages.items():
-        at: Any = (i, *np.unravel_index(place, cells), r)
-        values["message"][at] = text
+        held = table.spelled(name) if name in WORD_FIELDS else rows[name]
+        grid[(rows["density_index"], *every, rows["realization"])] = held
     return values
 
 
@@ -148,7 +146,8 @@ def _unit_values(study: Study, table: Table) -> Values:
     rows, shape = table.rows, (len(study.densities), study.statistics.cap)
     values: Values = {name: np.full(shape, v.empty, v.dtype) for name, v in UNIT_VARIABLES.items()}
     for name, grid in values.items():
-        grid[rows["density_index"], rows["realization"]] = rows[name]
+        held = table.spelled(name) if name in WORD_FIELDS else rows[name]
+        grid[rows["density_index"], rows["realization"]] = held
     return values
 
 

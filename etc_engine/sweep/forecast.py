@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.durable.lock import Holder, alive, read_holder
-from etc_engine.errors import EtcError
+from etc_engine.errors import EtcError, PackingError
+from etc_engine.realization import Status
 from etc_engine.study.sweep import Study, read_study
 from etc_engine.sweep.claim import difference
 from etc_engine.sweep.dataset import assemble
@@ -21,10 +22,14 @@ from etc_engine.sweep.records import Record, encode
 from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.shards import SUFFIX, ShardReader, read_study_file, shard_folder
 from etc_engine.sweep.sweep import Realize, run_unit
-from etc_engine.sweep.table import tabulate
+from etc_engine.sweep.table import row_type, tabulate
 
 PROBE_SECONDS = 20.0
 """A probe that took longer than this is not repeated: what it lost to compilation is a small part of it."""
+
+
+JOINING = 2
+"""The table of all units is held twice while rank 0 joins its parts."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,8 @@ class Forecast:
     """What a sweep would do.
 
     ``units`` are planned at first, ``most_units`` at most (adaptive sweeps); ``unit_seconds`` are those of the
-    costliest and the cheapest unit, ``first_seconds`` of the very first one, with compilation.
+    costliest and the cheapest unit, ``first_seconds`` of the very first one, with compilation. ``gathered_bytes`` is
+    what rank 0 needs beside ``rank_bytes`` for the results of ``most_units`` units.
     """
 
     units: int
@@ -44,6 +50,7 @@ class Forecast:
     first_seconds: float
     unit_seconds: tuple[float, float]
     rank_bytes: int
+    gathered_bytes: int
     shard_bytes: int
     dataset_bytes: int
     remarks: tuple[str, ...]
@@ -64,6 +71,8 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
     ------
     StudyError
         If the study is not valid.
+    PackingError
+        If the packing of a probe does not reach its density.
     """
     study, _ = read_study(study_path)
     state, done = what_is_there(study, output)
@@ -72,11 +81,15 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
     first, record = _probe(study, units[0], realize)
     costly = first if first > PROBE_SECONDS else _probe(study, units[0], realize)[0]
     same = units[-1, 0] == units[0, 0] or first > PROBE_SECONDS
-    cheap = costly if same else _probe(study, units[-1], realize)[0]
+    cheap, thin = (costly, record) if same else _probe(study, units[-1], realize)
+    for probed in (record, thin):
+        _refuse_density(probed)
+    dataset_bytes = assemble(study, tabulate(study, []), {}).nbytes
+    most = len(study.densities) * study.statistics.cap
     messages = dict.fromkeys(cell.message for cell in record.result.cells if cell.message)
     return Forecast(
         units=len(units),
-        most_units=len(study.densities) * study.statistics.cap,
+        most_units=most,
         cells=len(units) * len(record.result.cells),
         finished=sum(tuple(unit) in done for unit in units.tolist()),
         state=state,
@@ -84,11 +97,22 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
         first_seconds=max(0.0, first - costly),
         unit_seconds=(costly, cheap),
         rank_bytes=_peak_bytes(),
+        gathered_bytes=JOINING * row_type(study).itemsize * most + dataset_bytes,
         shard_bytes=len(encode(record)) * len(units),
-        dataset_bytes=assemble(study, tabulate(study, []), {}).nbytes,
+        dataset_bytes=dataset_bytes,
         remarks=tuple(messages),
         packings=_packings(study),
     )
+
+
+def _refuse_density(probed: Record) -> None:
+    """Refuse a density that the packing of a probe does not reach."""
+    failed = [cell.message for cell in probed.result.cells if cell.status == Status.PACKING_FAILED]
+    if failed:
+        own = "the packer's own density" if probed.unit.density is None else f"density {probed.unit.density:g}"
+        raise PackingError(
+            f"{own} is out of reach, as a probe of realization {probed.unit.realization} shows: {failed[0]}"
+        )
 
 
 def _packings(study: Study) -> tuple[str, ...]:
@@ -119,7 +143,8 @@ def _in_shards(study: Study, folder: Path) -> tuple[str, set[tuple[int, int]]]:
         what = f" ({difference(found[1], study.identity())})" if found else ""
         return f"shards of another study{what}: --resume is refused, --overwrite starts anew", set()
     reader = ShardReader(folder)
-    done = {(int(i), int(r)) for i, r in tabulate(study, reader.read(reader.files())).units}
+    records = reader.read(reader.files())
+    done = {(study.densities.index(record.unit.density), record.unit.realization) for record in records}
     return f"{len(done)} finished units in shards ({reader.damaged} damaged): --resume continues", done
 
 

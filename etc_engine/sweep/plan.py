@@ -92,7 +92,7 @@ def units_to_run(densities: Sequence[float | None], targets: Sequence[int], fini
     ndarray, shape (n, 2)
         Density index and realization of the units to run.
     """
-    done = np.zeros((len(densities), 1 + max([*targets, *finished[:, 1]])), dtype=bool)
+    done = np.zeros((len(densities), 1 + max([*targets, finished[:, 1].max(initial=0)])), dtype=bool)
     done[finished[:, 0], finished[:, 1]] = True
     wanted = np.arange(done.shape[1]) < np.asarray(targets)[:, None]
     units = np.argwhere(wanted & ~done)

@@ -154,9 +154,9 @@ class ShardReader:
         self._known += sorted(found)
         return self._known
 
-    def read(self, files: Iterable[Path]) -> list[Record]:
-        """The records of some shards that were not read before."""
-        return [decode(text) for path in files for text in self._new_lines(path)]
+    def read(self, files: Iterable[Path]) -> Iterator[Record]:
+        """The records of some shards that were not read before, one after the other."""
+        return (decode(text) for path in files for text in self._new_lines(path))
 
     def _new_lines(self, path: Path) -> Iterator[str]:
         if not path.exists():
@@ -184,9 +184,10 @@ def read_study_file(folder: Path) -> tuple[str, dict[str, Any]] | None:
     """Digest and identity of the study a folder belongs to; None if it does not say."""
     try:
         values = json.loads((folder / "study.json").read_text())
-    except (FileNotFoundError, ValueError):
+        digest, identity = values["digest"], values["study"]
+    except (FileNotFoundError, ValueError, TypeError, KeyError, RecursionError):
         return None
-    return values["digest"], values["study"]
+    return (digest, identity) if isinstance(digest, str) and isinstance(identity, dict) else None
 
 
 def clear_folder(folder: Path) -> None:

@@ -270,7 +270,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
 
 def _finish(claim: Claim, table: Table, computed: int) -> Outcome:
     """Assemble the dataset, put it in place, take the shards away."""
-    hosts = np.unique(table.rows["worker_host"]).tolist()
+    hosts = sorted(set(table.spelled("worker_host")))
     attributes = global_attributes(claim.study, claim.text, recorded_runs(claim.folder), hosts)
     dataset = assemble(claim.study, table, attributes)
     outcome = Outcome(claim.output, len(table.rows), computed, _count_cells(dataset))

@@ -1,13 +1,14 @@
 """The table of a sweep: finished units as rows of one structured array, the cells of a unit in its row.
 
 The ranks turn the shards into rows in parallel and rank 0 joins the arrays. Record by record on rank 0, reading would
-take longer than computing as soon as some thousand ranks work.
+take longer than computing as soon as some thousand ranks work. A row holds a word (host, message) as its number in a
+list of words: a million rows repeat a few of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -55,8 +56,9 @@ CELL_VARIABLES = {
     "solved_by": Variable(object, "", "full, or reduced: made of the solutions at other contact angles"),
     "snapshots": Variable(np.int64, -1, "solutions at other contact angles in a reduced one"),
 }
-WORD = "U64"
-"""Longest word, such as the name of a host, that a row holds."""
+WORD = np.int32
+"""How a row holds a word: its number in the words of the table."""
+NO_WORDS = ("",)
 
 MEASURES = {2: "area", 3: "volume"}
 """What a density is a fraction of, by dimension."""
@@ -74,6 +76,10 @@ UNIT_VARIABLES = {
 }
 
 
+WORD_FIELDS = (*(n for n, v in {**UNIT_VARIABLES, **CELL_VARIABLES}.items() if v.dtype is object), "message")
+"""Fields of a row that hold words."""
+
+
 @dataclass(frozen=True)
 class Table:
     """Finished units, each once, by density index and realization.
@@ -82,14 +88,18 @@ class Table:
     ----------
     rows : ndarray, shape (n,)
         Fields ``density_index``, ``realization``, the names of `UNIT_VARIABLES`, and with the shape of the cells
-        (axes, methods) those of `CELL_VARIABLES`, ``status``, ``conductivity`` (there (..., d, d)) and
+        (axes, methods) those of `CELL_VARIABLES`, ``message``, ``status``, ``conductivity`` (there (..., d, d)) and
         ``conductivity_bounds`` (there (..., d, 2)).
-    messages : dict
-        (density index, realization, place of the cell among all of its unit) -> what went wrong.
+    words : tuple of str
+        What the numbers of `WORD_FIELDS` stand for; the first is empty.
     """
 
     rows: NDArray[Any]
-    messages: dict[tuple[int, int, int], str] = field(default_factory=dict)
+    words: tuple[str, ...] = NO_WORDS
+
+    def spelled(self, name: str) -> NDArray[np.object_]:
+        """The words of a field of `WORD_FIELDS`, in the shape of the field; equal ones are one object."""
+        return np.array(self.words, dtype=object)[self.rows[name]]
 
     @property
     def units(self) -> Ints:
@@ -103,7 +113,7 @@ def row_type(study: Study) -> np.dtype[Any]:
     fields: list[Any] = [("density_index", np.int64), ("realization", np.int64)]
     fields += [(name, WORD if v.dtype is object else v.dtype) for name, v in UNIT_VARIABLES.items()]
     fields += [(name, WORD if v.dtype is object else v.dtype, cells) for name, v in CELL_VARIABLES.items()]
-    fields += [("status", np.int8, cells), ("conductivity", np.float64, (*cells, d, d))]
+    fields += [("message", WORD, cells), ("status", np.int8, cells), ("conductivity", np.float64, (*cells, d, d))]
     fields += [("conductivity_bounds", np.float64, (*cells, d, 2))]
     return np.dtype(fields)
 
@@ -114,7 +124,7 @@ def tabulate(study: Study, records: Iterable[Record]) -> Table:
     rows = np.empty(len(records), row_type(study))
     if not records:
         return Table(rows)
-    results = [record.result for record in records]
+    results, words = [record.result for record in records], {"": 0}
     rows["density_index"] = [study.densities.index(record.unit.density) for record in records]
     rows["realization"] = [record.unit.realization for record in records]
     rows["particles"] = [result.particles for result in results]
@@ -123,24 +133,26 @@ def tabulate(study: Study, records: Iterable[Record]) -> Table:
     rows["pack_seconds"] = [result.pack_seconds for result in results]
     rows["random_stream"] = [stream_fingerprint(study.seed, record.unit) for record in records]
     rows["worker_rank"] = [record.rank for record in records]
-    rows["worker_host"] = [record.host for record in records]
+    rows["worker_host"] = [_number_of(record.host, words) for record in records]
     rows["start_time"] = [record.start_time for record in records]
     rows["end_time"] = [record.end_time for record in records]
     cells, d = study.shape, study.box.dimension
     every = [cell for result in results for cell in result.cells]
-    for name in (*CELL_VARIABLES, "status"):
-        rows[name] = np.array([getattr(cell, name) for cell in every], rows[name].dtype).reshape(-1, *cells)
+    for name in (*CELL_VARIABLES, "message", "status"):
+        values = [getattr(cell, name) for cell in every]
+        if name in WORD_FIELDS:
+            values = [_number_of(value, words) for value in values]
+        rows[name] = np.array(values, rows[name].dtype).reshape(-1, *cells)
     tensors = np.array([_known(cell, cell.conductivity, (d, d)) for cell in every])
     bounds = np.array([_known(cell, cell.conductivity_bounds or None, (d, 2)) for cell in every])
     rows["conductivity"] = tensors.reshape(-1, *cells, d, d)
     rows["conductivity_bounds"] = bounds.reshape(-1, *cells, d, 2)
-    messages = {
-        (int(i), int(r), place): cell.message
-        for i, r, result in zip(rows["density_index"], rows["realization"], results, strict=True)
-        for place, cell in enumerate(result.cells)
-        if cell.message
-    }
-    return join([Table(rows, messages)])
+    return join([Table(rows, tuple(words))])
+
+
+def _number_of(word: str, words: dict[str, int]) -> int:
+    """The number of a word, which joins the words if it is new."""
+    return words.setdefault(word, len(words))
 
 
 def _known(cell: Outcome, values: Any, shape: tuple[int, ...]) -> Floats:
@@ -151,8 +163,24 @@ def _known(cell: Outcome, values: Any, shape: tuple[int, ...]) -> Floats:
 
 
 def join(tables: Sequence[Table]) -> Table:
-    """One table of several; a unit that was computed twice is kept once."""
-    rows = np.concatenate([table.rows for table in tables])
-    _, first = np.unique(rows[["density_index", "realization"]], return_index=True)
-    messages = {place: text for table in tables for place, text in table.messages.items()}
-    return Table(rows[first], messages)
+    """One table of several; a unit that was computed twice is kept once, as the first table that has it says.
+
+    Beside the tables only the joined one takes memory that grows with the rows.
+    """
+    indices = np.concatenate([table.rows["density_index"] for table in tables])
+    realizations = np.concatenate([table.rows["realization"] for table in tables])
+    order = np.lexsort((realizations, indices))  # stable: of equal units the first comes first
+    new = np.ones(order.size, dtype=np.bool_)
+    new[1:] = (np.diff(indices[order]) != 0) | (np.diff(realizations[order]) != 0)
+    rows, words = np.empty(int(new.sum()), tables[0].rows.dtype), {"": 0}
+    place = np.full(order.size, -1)
+    place[order[new]] = np.arange(rows.size)  # where each row goes, or -1
+    start = 0
+    for table in tables:
+        to = place[start : start + len(table.rows)]
+        start, kept = start + len(table.rows), to >= 0
+        rows[to[kept]] = table.rows[kept]
+        numbers = np.array([_number_of(word, words) for word in table.words], dtype=WORD)
+        for name in WORD_FIELDS:
+            rows[name][to[kept]] = numbers[table.rows[name][kept]]
+    return Table(rows, tuple(words))

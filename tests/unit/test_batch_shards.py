@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+import random
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -11,16 +14,18 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.durable.files import write_atomically
+from etc_engine.durable.provenance import this_run
 from etc_engine.errors import OutputError
 from etc_engine.medium.conduction import Conduction
 from etc_engine.packing import PackingSpec, parse_radii
 from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
 from etc_engine.study.sweep import parse_study
 from etc_engine.sweep import gathering
+from etc_engine.sweep.claim import recorded_runs
 from etc_engine.sweep.plan import Unit
 from etc_engine.sweep.records import Record, decode, encode, failed_realization
 from etc_engine.sweep.scheduler import Solo
-from etc_engine.sweep.shards import ShardReader, ShardWriter, frame, unframe
+from etc_engine.sweep.shards import ShardReader, ShardWriter, frame, read_study_file, unframe
 from etc_engine.sweep.table import join, tabulate
 
 
@@ -50,7 +55,7 @@ realizations = 3
 
 def read(folder) -> list[Record]:
     reader = ShardReader(folder)
-    return reader.read(reader.files())
+    return list(reader.read(reader.files()))
 
 
 def bits(found: Record) -> bytes:
@@ -144,6 +149,44 @@ def test_a_unit_run_twice_is_kept_once(tmp_path):
     assert table.units.tolist() == [[0, 0], [0, 1], [0, 2]]
 
 
+def described_run(folder) -> bytes:
+    run = this_run("20260101T000000-abc", 4, "slurm 17")
+    (folder / f"{run.run}.run").write_bytes(frame(json.dumps(asdict(run))))
+    assert recorded_runs(folder) == [run]
+    return (folder / f"{run.run}.run").read_bytes()
+
+
+@pytest.mark.parametrize("seed", range(1, 61))
+def test_a_damaged_record_of_a_run_is_refused_with_what_to_do(tmp_path, seed):
+    data, rng = bytearray(described_run(tmp_path)), random.Random(seed)
+    damage = rng.choice(["cut", "flip", "zero"])
+    if damage == "cut":
+        del data[rng.randrange(len(data)) :]
+    elif damage == "flip":
+        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    else:
+        start = rng.randrange(len(data))
+        data[start : start + 16] = bytes(len(data[start : start + 16]))
+    next(tmp_path.glob("*.run")).write_bytes(data)
+    with pytest.raises(OutputError, match=r"\.run.* is damaged: remove it and continue with --resume"):
+        recorded_runs(tmp_path)
+
+
+def test_the_record_of_a_run_of_an_earlier_version_is_read(tmp_path):
+    run = this_run("20260101T000000-abc", 4, "")
+    (tmp_path / "old.run").write_text(json.dumps(asdict(run)))
+    assert recorded_runs(tmp_path) == [run]
+    (tmp_path / "old.run").write_text(json.dumps(asdict(run) | {"ranks": "4"}))
+    with pytest.raises(OutputError, match="damaged"):
+        recorded_runs(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", "3", '{"digest": "a"}', '{"digest": 1, "study": {}}', "{" * 5000])
+def test_a_damaged_note_of_the_study_is_no_note(tmp_path, text):
+    (tmp_path / "study.json").write_text(text)
+    assert read_study_file(tmp_path) is None
+
+
 def test_the_order_of_shards_only_grows(tmp_path):
     reader = ShardReader(tmp_path)
     names = ["m", "z", "a"]
@@ -157,8 +200,9 @@ def test_a_table_holds_what_the_records_say():
     table = tabulate(STUDY, [record(2, 0.25, "a remark"), record(0, 0.5)])
     assert table.units.tolist() == [[0, 0], [0, 2]]
     assert table.rows["conductivity"][:, 1, 0, 1, 1].tolist() == [-0.5, -0.25]
-    assert table.rows["worker_host"].tolist() == ["node", "node"]
-    assert set(table.messages) == {(0, 2, place) for place in range(4)}
+    assert table.spelled("worker_host").tolist() == ["node", "node"]
+    assert set(table.spelled("message")[0].ravel()) == {""}
+    assert set(table.spelled("message")[1].ravel()) == {"a remark"}
 
 
 def test_a_full_disk_is_told_and_leaves_whole_lines(tmp_path, monkeypatch):
