@@ -165,7 +165,7 @@ def _check(radii: RadiusDistribution) -> None:
     for length in lengths[:1] if spread else lengths:
         if not SHORTEST <= length <= LONGEST:
             raise InputError(
-                f"size distribution {found!r} has the radius {length:g}: expected metres, from {SHORTEST:g} to {LONGEST:g}"
+                f"size distribution {found!r} has the radius {length:g}: expected {SHORTEST:g} to {LONGEST:g} metres"
             )
     if not spread and max(lengths) > WIDEST_RANGE * min(lengths):
         raise InputError(

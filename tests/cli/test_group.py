@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import click
 import pytest
@@ -115,3 +116,53 @@ def _threads_seen(**environment: str) -> str:
 def test_one_thread_unless_asked():
     assert _threads_seen() == "{1}"
     assert _threads_seen(OPENBLAS_NUM_THREADS="2", OMP_NUM_THREADS="2") != "{1}"
+
+
+LOST = "standard output cannot be written"
+MANY = ("models",)
+PACK = ("pack", "--radii", "equal:0.1", "--box", "1,1", "--seed", "5", "-o")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
+@pytest.mark.parametrize("arguments", [("--help",), MANY, (*PACK, "-")])
+def test_a_full_standard_output_ends_in_words(arguments):
+    with Path("/dev/full").open("w") as full:
+        done = _with_output(full, *arguments)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"{LOST} (No space left on device)" in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("--version",), MANY, (*PACK, "-")])
+def test_a_closed_standard_output_ends_in_words(arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = _with_output(writer, *arguments)
+    os.close(writer)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"{LOST} (Broken pipe)" in done.stderr
+    none = subprocess.run(
+        ["/bin/sh", "-c", '"$@" >&-', "sh", sys.executable, "-m", "etc_engine", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert none.returncode == 2
+    assert f"{LOST} (it is closed)" in none.stderr
+
+
+def test_the_result_is_kept_where_nothing_can_be_printed(tmp_path):
+    for name, redirection in (("a.csv", ">&-"), ("b.csv", "2>&-"), ("c.csv", ">&- 2>&- <&-")):
+        subprocess.run(
+            ["/bin/sh", "-c", f'"$@" {redirection}', "sh", sys.executable, "-m", "etc_engine", *PACK, tmp_path / name],
+            capture_output=True,
+            check=False,
+        )
+    whole = (tmp_path / "a.csv").read_text()
+    assert whole.count("\n") > 10
+    assert (tmp_path / "b.csv").read_text() == whole == (tmp_path / "c.csv").read_text()
+
+
+def _with_output(output, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "etc_engine", *arguments], stdout=output, stderr=subprocess.PIPE, text=True, check=False
+    )

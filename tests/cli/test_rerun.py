@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -121,3 +122,14 @@ def test_a_dry_run_tells_units_time_and_memory_and_writes_nothing(etc_engine, re
     other = tmp_path / "other.toml"
     other.write_text(study_text.replace("20261", "5"))
     assert "the output of another study" in etc_engine("sweep", other, "-o", result, "--dry-run").stdout
+
+
+def test_a_dry_run_fails_where_a_density_is_out_of_reach(etc_engine, result, tmp_path):
+    study, far = result.with_name("study.toml"), tmp_path / "far.toml"
+    far.write_text(re.sub(r"density = .*", "density = [0.7, 0.95]", study.read_text()))
+    done = etc_engine("sweep", far, "-o", tmp_path / "new.nc", "--dry-run")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "density 0.95 is out of reach" in done.stderr
+    assert "own 0.77" in done.stderr  # what the packer reaches
+    assert not list(tmp_path.glob("new.nc*"))

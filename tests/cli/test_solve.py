@@ -126,9 +126,9 @@ def test_impossible_geometries_are_refused(etc_engine, disks):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--contact-angle", 0), "between 0 and 90 degrees"),
-        (("--contact-angle", 90), "between 0 and 90 degrees"),
-        (("--contact-angle", "nan"), "between 0 and 90 degrees"),
+        (("--contact-angle", 0), "between 1e-06 and 90 degrees"),
+        (("--contact-angle", 90), "between 1e-06 and 90 degrees"),
+        (("--contact-angle", "nan"), "between 1e-06 and 90 degrees"),
         (("--contact-angle", 5, "--bond-gap", -1), "bond gap"),
         (("--method", "spline"), "engine dtem has no method 'spline': expected one of chord"),
         (("--conductivity", 0), "conductivity must be positive"),

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 import os
 import random
+import subprocess
+import sys
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,11 +25,12 @@ from etc_engine.realization import Outcome, Realization, RealizationSpec, Status
 from etc_engine.study.sweep import parse_study
 from etc_engine.sweep import gathering
 from etc_engine.sweep.claim import recorded_runs
+from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.plan import Unit
 from etc_engine.sweep.records import Record, decode, encode, failed_realization
 from etc_engine.sweep.scheduler import Solo
 from etc_engine.sweep.shards import ShardReader, ShardWriter, frame, read_study_file, unframe
-from etc_engine.sweep.table import join, tabulate
+from etc_engine.sweep.table import join, row_type, tabulate
 
 
 def record(realization: int, value: float = 0.3, message: str = "") -> Record:
@@ -257,3 +261,49 @@ def test_a_shard_that_the_folder_does_not_show_yet_is_read_by_name(tmp_path):
     gatherer = gathering.Gatherer(STUDY, tmp_path, Solo())
     assert gatherer.gather(elsewhere / "not-yet.shard").units.size == 0
     assert gatherer.gather(writer.path).units.tolist() == [[0, 1]]
+
+
+MANY = """
+schema = 2
+name = "many"
+seed = 20261
+[packing]
+radii = "uniform:0.01:0.02"
+box = [1.0, 1.0]
+density = 0.7
+[contacts]
+rule = "bonded"
+contact_angle = 2.5
+[statistics]
+realizations = 2000
+"""
+
+
+def test_rank_0_holds_less_than_a_kilobyte_a_unit():
+    study = parse_study(MANY)
+    data = assemble(study, tabulate(study, []), {})
+    # the table twice while its parts are joined; then the table, the dataset, and a copy of it while it is written
+    assert 2 * row_type(study).itemsize < 1000
+    assert row_type(study).itemsize + 2 * data.nbytes / 2000 < 1000
+
+
+@pytest.mark.slow
+def test_measured_memory_of_gathering_stays_below_a_kilobyte_a_unit():
+    script = Path(__file__).parents[1] / "benchmarks" / "bench_gathering.py"
+    done = subprocess.run(
+        [sys.executable, script, "--units", "40000"], capture_output=True, text=True, check=True, timeout=600
+    )
+    assert float(done.stdout.split()[2]) < 1000
+
+
+def test_portions_of_many_ranks_join_to_the_same_table(tmp_path, monkeypatch):
+    for name in ("a", "b"):
+        with ShardWriter(tmp_path, name, 0) as writer:
+            for r in range(9):
+                writer.append(record(r, 0.1 * r, f"remark {r % 3}"))
+    whole = gathering.Gatherer(STUDY, tmp_path, Solo()).gather()
+    monkeypatch.setattr(gathering, "PORTION", 8)  # two records at a time
+    parts = gathering.Gatherer(STUDY, tmp_path, Solo()).gather()
+    assert parts.units.tolist() == [[0, r] for r in range(9)]
+    assert parts.rows.tobytes() == whole.rows.tobytes()
+    assert parts.words == whole.words == ("", "node", "remark 0", "remark 1", "remark 2")

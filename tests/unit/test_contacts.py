@@ -5,7 +5,7 @@ import pytest
 
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError, InputError
-from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts
+from etc_engine.medium.rules import bonded_contacts, coordination_contacts, overlap_contacts, radius_contacts
 from etc_engine.packing.particles import ParticlePacking
 
 UNIT = Box((1.0, 1.0))
@@ -68,7 +68,7 @@ def test_a_half_angle_of_90_degrees_is_refused():
 
 @pytest.mark.parametrize("angle", [0.0, -0.1, np.pi / 2, 2.0, np.nan])
 def test_bonded_half_angles_out_of_range_are_refused(angle):
-    with pytest.raises(InputError, match="between 0 and 90 degrees"):
+    with pytest.raises(InputError, match="between 1e-06 and 90 degrees"):
         bonded_contacts(ParticlePacking([[0.5, 0.5]], [0.1], UNIT), angle)
 
 
@@ -94,3 +94,13 @@ def test_closest_pairs_give_the_coordination_number_wanted(wanted):
 def test_senseless_coordination_numbers_are_refused(wanted):
     with pytest.raises(InputError, match="coordination number must be positive"):
         coordination_contacts(ParticlePacking([[0.5, 0.5]], [0.1], UNIT), 0.1, wanted)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1e-320, 9e-7, 90.0, float("nan")])
+def test_half_angles_outside_their_range_are_refused(degrees):
+    packing = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.25], Box((1.0, 1.0)))
+    with pytest.raises(InputError, match="between 1e-06 and 90 degrees"):
+        bonded_contacts(packing, float(np.radians(degrees)))
+    with pytest.raises(InputError):
+        radius_contacts(packing, 0.25 * float(np.sin(np.radians(degrees))))
+    assert bonded_contacts(packing, float(np.radians(1e-6))).count == 1

@@ -75,3 +75,10 @@ def test_every_process_makes_the_same_bits():
         here.append(hashlib.sha256(packing.centers.tobytes() + packing.radii.tobytes()).hexdigest())
     assert elsewhere.stdout.split() == here
     assert len(set(here)) == len(METHODS)
+
+
+@pytest.mark.parametrize("method", ["advancing-front", "lubachevsky-stillinger", "random-sequential"])
+def test_more_particles_than_a_machine_holds_are_refused(method):
+    spec = PackingSpec(method, parse_radii("equal:1e-9"), Box((1.0, 1.0)), density=0.5)
+    with pytest.raises(InputError, match=r"about 1.59e\+17 particles, above 1e\+09: use larger radii"):
+        pack(spec, np.random.default_rng(20261))

@@ -158,7 +158,7 @@ def test_contacts_that_meet_and_what_else_cannot_be_are_refused():
     triple = ParticlePacking([[1.0, 1.0, 1.0], [2.0, 1.0, 1.0], [1.5, 1.0 + np.sqrt(0.75), 1.0]], [0.5] * 3, box)
     with pytest.raises(GeometryError, match="two contact disks of particle 0 overlap: 60 degrees apart"):
         effective_conductivity(medium_of(bonded_contacts(triple, np.radians(31.0))))
-    with pytest.raises(InputError, match="between 0 and 90 degrees"):
+    with pytest.raises(InputError, match="between 1e-06 and 90 degrees"):
         bonded_contacts(triple, np.radians(90.0))
     with pytest.raises(GeometryError, match="one lies inside the other"):
         overlap_contacts(ParticlePacking([[1.0, 1.0, 1.0], [1.1, 1.0, 1.0]], [0.5, 0.2], box))
