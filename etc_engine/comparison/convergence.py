@@ -90,7 +90,7 @@ def system_sizes(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
         other = _comparable(dataset)
         for key, value in first.items():
             if other[key] != value:
-                raise InputError(f"result {number + 1} is of another study: {key} is {other[key]}, not {value}")
+                raise InputError(f"result {number + 1} belongs to another study: {key} is {other[key]}, not {value}")
         statistics = simulated(dataset)
         system = statistics[["conductivity_mean", "half_width"]]
         system["relative_spread"] = samples(dataset).std("realization", ddof=1) / system["conductivity_mean"]

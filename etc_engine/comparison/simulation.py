@@ -98,7 +98,7 @@ def phases(dataset: xarray.Dataset) -> Phases:
     study = current_study(dataset)
     if "particle_conductivity" not in dataset.coords:
         raise InputError(
-            "models of two phases need particles of one material, those of this sweep have conductivities of their own "
+            "two-phase models need particles of one material: the particles of this sweep differ in conductivity "
             "(by type, or a column of their files)"
         )
     pores, particles = dataset["pore_conductivity"], dataset["particle_conductivity"]
@@ -106,7 +106,7 @@ def phases(dataset: xarray.Dataset) -> Phases:
         other = dataset["mixture_conductivity"]
         if not bool((other == particles).all()):
             raise InputError(
-                f"models of two phases need particles of one material, this study mixes {in_words(particles)} and "
+                f"two-phase models need particles of one material, this study mixes {in_words(particles)} and "
                 f"{in_words(other)} W/(m K): compare it as studies/mixture does"
             )
     glow = bool((dataset.coords.get("emissivity", pores * 0.0) > 0.0).any())

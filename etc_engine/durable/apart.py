@@ -57,7 +57,7 @@ def why_unreadable(path: Path, program: str) -> str:
             line, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=limit, check=False
         )
     except subprocess.TimeoutExpired:
-        return f"the reading library does not come to an end within {limit:.0f} s, the file is damaged"
+        return f"the reading library did not finish within {limit:.0f} s, the file is damaged"
     if done.returncode == 0:
         return ""
     said = (done.stderr.strip().splitlines() or [f"the reading process ended with {done.returncode}"])[-1]

@@ -49,9 +49,9 @@ class Conditions:
 
     def __post_init__(self) -> None:
         if self.gas is None and self.pressure is not None:
-            raise InputError("a pressure is of a gas: give the gas by name, such as helium")
+            raise InputError("a pressure needs a gas: name one, such as helium")
         if self.gas is None and self.accommodation is not None:
-            raise InputError("an accommodation coefficient is of a gas: give the gas by name, such as helium")
+            raise InputError("an accommodation coefficient needs a gas: name one, such as helium")
         if self.gas is not None and (self.temperature is None or self.pressure is None):
             missing = "temperature" if self.temperature is None else "pressure"
             raise InputError(f"a gas needs a {missing}: without it its conductivity is not known")

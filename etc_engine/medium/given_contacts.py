@@ -115,7 +115,7 @@ def reach_of_contacts(
         raise InputError("the width of contacts comes from their area or from their force: give one of them")
     if area is not None:
         if packing.dimension == 2:
-            raise InputError("areas are of contacts of spheres; disks take the force")
+            raise InputError("contact areas are for spheres: use the force for disks")
         return radius_from_area(area)
     if material is None:
         raise InputError("the width of a contact under a force needs Young's modulus and Poisson's ratio")

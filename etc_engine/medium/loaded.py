@@ -245,7 +245,7 @@ def area_contacts(near: Neighbors, areas: ArrayLike, softening: float = 1.0) -> 
     ContactNetwork
     """
     if near.packing.dimension != 3:
-        raise InputError("contact areas are of spheres: the packing has two dimensions")
+        raise InputError("contact areas are for spheres, found a packing in two dimensions")
     widths = radius_from_area(_per_contact(near, areas, "area")) * float(np.cbrt(softening))
     return _network(near, widths, "area")
 

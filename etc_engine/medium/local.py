@@ -63,7 +63,7 @@ class LocalProperties:
             If a temperature is out of the range of the gas.
         """
         if not (temperatures > 0.0).all():
-            raise InputError(f"properties take absolute temperatures, found {float(temperatures.min()):g} K")
+            raise InputError(f"temperatures must be absolute, found {float(temperatures.min()):g} K")
         below = np.maximum(np.floor(temperatures / SPACING).astype(np.int64) - 1, 1)
         for number in np.unique(below).tolist():
             for step in range(number, number + 4):

@@ -224,5 +224,5 @@ def wall_conditions(box: Box, named: Mapping[str, WallCondition]) -> tuple[WallC
         if name not in names:
             raise InputError(f"unknown wall {name!r}: expected one of {', '.join(names)}")
         if box.periodic[names.index(name) // 2] and not isinstance(condition, Insulated):
-            raise InputError(f"the box is periodic across the {name} wall: there is none to hold a condition")
+            raise InputError(f"the box is periodic across the {name} wall: there is no such wall")
     return tuple(named.get(name, Insulated()) for name in names)

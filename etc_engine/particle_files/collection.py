@@ -84,7 +84,7 @@ def find_sources(
     names = sorted(glob.glob(pattern, root_dir=folder, recursive=True))  # noqa: PTH207 - absolute patterns too
     names = [name for name in names if (folder / name).is_file()]
     if not names:
-        raise InputError(f"no file is found by {pattern!r} in {folder}")
+        raise InputError(f"no file matches {pattern!r} in {folder}")
     found: list[PackingSource] = []
     for name in names:
         path = folder / name

@@ -165,7 +165,7 @@ def contact_rows(table: ParticleTable, contacts: ContactTable) -> Ints:
     order = np.argsort(table.ids, kind="stable")
     ids = table.ids[order]
     if (np.diff(ids) == 0).any():
-        raise InputError(f"the id {ids[1:][np.diff(ids) == 0][0]} stands for several particles")
+        raise InputError(f"the id {ids[1:][np.diff(ids) == 0][0]} belongs to several particles")
     found = np.minimum(np.searchsorted(ids, contacts.ids), ids.size - 1)
     known = (ids[found] == contacts.ids).all(axis=1)
     if contacts.count and not known.any():

@@ -175,7 +175,7 @@ def _lines(path: Path, stream: Iterable[bytes]) -> Iterator[str]:
             text = (line.removeprefix(BOM) if first else line).decode("utf-8")
         except UnicodeDecodeError as error:
             raise InputError(
-                f"{path} is not a format I know, and cannot be read as text: {error.reason} in {line[:40]!r}"
+                f"{path} is not in a known format, and cannot be read as text: {error.reason} in {line[:40]!r}"
             ) from None
         if "\x00" in text:
             raise InputError(f"{path} is not a table of text: it holds zero bytes")
@@ -198,12 +198,12 @@ def _header(path: Path, number: int, header: str) -> tuple[list[str], str | None
         )
     if not _names_positions(" ".join(names)):
         raise InputError(
-            f"{path} is not a format I know: its first line {header[:60]!r} is no header such as 'x,y,radius', and no "
-            "other format begins like that"
+            f"{path} is not in a known format: its first line {header[:60]!r} is no header such as 'x,y,radius', "
+            "and no other format begins like that"
         )
     doubled = {name for name in names if [other.lower() for other in names].count(name.lower()) > 1}
     if doubled:
-        raise InputError(f"{path} has the header {header[:80]!r}: the column {sorted(doubled)[0]!r} stands there twice")
+        raise InputError(f"{path} has the header {header[:80]!r}: the column {sorted(doubled)[0]!r} appears twice")
     return names, separator
 
 

@@ -108,7 +108,7 @@ def _labelled(path: Path, values: NDArray[np.generic]) -> LabelImage:
             f"{path} has {phases.size} different values: label its phases first (at most {MOST_LABELS} are understood)"
         )
     if phases.size < 2:
-        raise InputError(f"{path} holds one phase only, of label {phases[0]}: nothing is to be homogenized")
+        raise InputError(f"{path} holds one phase only, of label {phases[0]}: there is nothing to homogenize")
     return LabelImage(np.ascontiguousarray(values, dtype=np.int64), tuple(int(phase) for phase in phases))
 
 

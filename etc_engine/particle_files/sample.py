@@ -188,7 +188,7 @@ def _dimension(rows: Rows, sample: Sample) -> tuple[int, tuple[str, ...]]:
     """2 or 3, and a note where heights decide."""
     wanted = sample.dimension
     if wanted is not None and sample.box is not None and len(sample.box) != wanted:
-        raise InputError(f"a box of {len(sample.box)} edges does not go with dimension {wanted}")
+        raise InputError(f"a box of {len(sample.box)} edges does not fit dimension {wanted}")
     heights = rows.positions.shape[1] == 3
     if wanted is None and sample.box is not None:
         wanted = len(sample.box)

@@ -142,7 +142,7 @@ class Engine:
         for name in options:
             if name not in heeded:
                 known = f"it heeds {', '.join(heeded)}" if heeded else "it heeds none"
-                raise InputError(f"option {name} means nothing to method {method} of engine {self.name}: {known}")
+                raise InputError(f"option {name} has no effect with method {method} of engine {self.name}: {known}")
         return {name: self.options[name].checked(name, options.get(name)) for name in heeded}
 
     def check(self, medium: Medium, method: str) -> None:
@@ -163,19 +163,19 @@ class Engine:
         if row.pores == NO and medium.pores.conduct:
             able = [name for name, other in self.methods.items() if other.pores != NO]
             cure = f"use {' or '.join(able)}" if able else "use another engine, or pores that do not conduct"
-            raise InputError(f"method {method} of engine {self.name} takes no heat through the pores: {cure}")
+            raise InputError(f"method {method} of engine {self.name} does not model heat through the pores: {cure}")
         if not row.gas and not medium.pores.plain:
             able = [name for name, other in self.methods.items() if other.gas]
             cure = f"use {' or '.join(able)}" if able else "use another engine, or a continuum without radiation"
             raise InputError(
-                f"method {method} of engine {self.name} takes neither the temperature jumps of a rarefied gas nor "
+                f"method {method} of engine {self.name} models neither the temperature jumps of a rarefied gas nor "
                 f"radiation: {cure}"
             )
         if medium.local is not None and not row.local:
             able = [name for name, other in self.methods.items() if other.local]
             cure = f"use {' or '.join(able)}" if able else "use another engine, or properties at one temperature"
             raise InputError(
-                f"method {method} of engine {self.name} takes no properties at the local temperature: {cure}"
+                f"method {method} of engine {self.name} does not model properties at the local temperature: {cure}"
             )
         if row.pores == MUST and not medium.pores.conduct:
             raise InputError(f"method {method} of engine {self.name} is only valid with pores that conduct")

@@ -186,7 +186,7 @@ def _value(value: object) -> str:
         return repr(value)  # Python and TOML write numbers alike, inf and nan included
     if isinstance(value, str):
         return _quoted(value)
-    raise StudyError(f"{SOURCE}: found {value!r} in a list, which a study has no use for")
+    raise StudyError(f"{SOURCE}: found {value!r} in a list, which a study does not take")
 
 
 def _word(key: str) -> str:

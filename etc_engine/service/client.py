@@ -214,7 +214,7 @@ def _json(
         except (ValueError, OSError, HTTPException):
             values = None
     if not isinstance(values, dict):
-        raise OutputError(f"{server.url} does not answer as an etc-engine service: is the address right?")
+        raise OutputError(f"{server.url} is not an etc-engine service: is the address right?")
     return values
 
 
@@ -262,7 +262,7 @@ def _reason(error: urllib.error.HTTPError) -> str:
         values = json.load(error)
         return str(values["error"])
     except (ValueError, KeyError, TypeError, OSError):
-        return f"the server answers {error.code} {error.reason}: is the address right?"
+        return f"the server returned {error.code} {error.reason}: is the address right?"
 
 
 class _NoRedirect(urllib.request.HTTPRedirectHandler):

@@ -79,7 +79,7 @@ class Guard:
     def _refusal(self, method: str, path: str, headers: dict[str, str]) -> tuple[int, str] | None:
         host = headers.get("host", "")
         if not self.knows_host(host):
-            return 421, f"this service does not answer under the name {host[:80]!r}: see the option --allow-host"
+            return 421, f"this service does not accept the name {host[:80]!r}: see the option --allow-host"
         origin = headers.get("origin")
         if method in CHANGING and (
             headers.get("sec-fetch-site", "none") not in ("none", "same-origin")

@@ -170,7 +170,7 @@ def _hold(root: Path, handle: int) -> None:
         holder = os.pread(handle, 32, 0).decode(errors="replace").strip()
         raise OutputError(
             f"data directory {root}: another service is using it (process {holder}): stop that one, "
-            "or give this one a directory of its own"
+            "or give this one another directory"
         ) from None
     os.ftruncate(handle, 0)
     os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)

@@ -21,7 +21,7 @@ def representable_numbers() -> Iterator[None]:
     >>> with representable_numbers():
     ...     raise RuntimeError("Factor is exactly singular")
     Traceback (most recent call last):
-    etc_engine.errors.ConvergenceError: the numbers leave what double precision can hold (Factor is exactly ...
+    etc_engine.errors.ConvergenceError: the numbers exceed double precision (Factor is exactly ...
     """
     with np.errstate(all="ignore"):
         try:
@@ -30,5 +30,5 @@ def representable_numbers() -> Iterator[None]:
             if isinstance(error, NotImplementedError | RecursionError):
                 raise
             raise ConvergenceError(
-                f"the numbers leave what double precision can hold ({error}): check the values of the study"
+                f"the numbers exceed double precision ({error}): check the values of the study"
             ) from error

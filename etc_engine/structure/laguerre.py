@@ -154,7 +154,7 @@ def refuse_hidden(facets: LaguerreFacets) -> None:
     empty = np.flatnonzero(facets.volumes <= 0.0)
     if empty.size:
         raise GeometryError(
-            f"{empty.size} particle(s) own no Laguerre cell (the first: particle {empty[0]}): they are hidden inside "
+            f"{empty.size} particle(s) have no Laguerre cell (the first: particle {empty[0]}): they are hidden inside "
             f"larger neighbours; remove them"
         )
     outside = np.argwhere(facets.distances <= 0.0)

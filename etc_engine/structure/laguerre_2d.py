@@ -177,7 +177,7 @@ def _refuse_lost(i: int, centers: Floats, radii: Floats, box: Box) -> None:
     if apart[j] == 0.0:
         raise GeometryError(f"particles {min(i, j)} and {max(i, j)} have the same centre: remove one of them")
     raise GeometryError(
-        f"particle {i} (radius {radii[i]:.6g}) owns no Laguerre cell: it is hidden by its neighbours, of which "
+        f"particle {i} (radius {radii[i]:.6g}) has no Laguerre cell: it is hidden by its neighbours, of which "
         f"particle {j} (radius {radii[j]:.6g}) is {apart[j]:.6g} away; remove particle {i}"
     )
 

@@ -194,7 +194,7 @@ def laguerre_polygons(centers: Floats, radii: Floats, box: Box) -> LaguerrePolyg
     if not np.all(volumes > 0.0):
         hidden = int(np.argmin(volumes))
         raise GeometryError(
-            f"sphere {hidden} at {centers[hidden].tolist()} owns no Laguerre cell: it lies inside its neighbours; "
+            f"sphere {hidden} at {centers[hidden].tolist()} has no Laguerre cell: it lies inside its neighbours; "
             f"remove it or make it larger"
         )
     filled = float(volumes.sum()) / box.volume

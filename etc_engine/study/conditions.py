@@ -35,7 +35,7 @@ def check_conditions(study: Study) -> None:
         raise ValueError("conduction.temperature: missing, the conductivity of particles.material depends on it")
     named = study.particles.material or getattr(study.particles, "types", None)
     if first["temperature"] is not None and not (named or study.pores.gas or glow):
-        raise ValueError("conduction.temperature: has no meaning without a material, a gas or radiation, take it out")
+        raise ValueError("conduction.temperature: has no effect without a material, a gas or radiation: remove it")
     derived_conductivities(study)
     if study.conduction.nonlinear:
         _check_local(study)

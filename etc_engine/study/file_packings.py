@@ -98,7 +98,7 @@ class FileStudy(Study):
     def _check_files(self) -> FileStudy:
         count = len(self.packing.sources)
         if self.statistics.relative_ci is not None:
-            raise ValueError("statistics.relative_ci: packings in files are as many as they are, take it out")
+            raise ValueError("statistics.relative_ci: the number of packings in files is fixed: remove it")
         if self.statistics.realizations > count:
             raise ValueError(
                 f"statistics.realizations: found {self.statistics.realizations}, the files hold {count} packings"
@@ -108,9 +108,7 @@ class FileStudy(Study):
             if given or (self.particles.types and self.packing.column):
                 what = sorted(given)[0] if given else "types"
                 own = "their types" if self.particles.types and given else "a column 'conductivity'"
-                raise ValueError(
-                    f"particles.{what}: has no meaning where the particles have {own}, take one of them out"
-                )
+                raise ValueError(f"particles.{what}: has no effect where the particles have {own}; remove one of them")
         for word in (self.particles.types or {}).values():
             if isinstance(word, str):
                 try:

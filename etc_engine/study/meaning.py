@@ -91,7 +91,7 @@ def refuse_meaningless(study: StudyTable, table: str = "") -> None:
         name, key = place.split(".")
         holder = getattr(study, name)
         if key in holder.model_fields_set and getattr(holder, key) != type(holder).model_fields[key].default:
-            raise ValueError(f"{place}: has no meaning with {choice}, take it out")
+            raise ValueError(f"{place}: has no effect with {choice}: remove it")
 
 
 def drop_meaningless(study: StudyTable, values: dict[str, Any]) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def _check_inputs(model: Model, known: dict[str, tuple[float, ...]], place: str)
     if missing:
         meanings = {item.name: item.meaning for item in model.inputs}
         described = ", ".join(f"{name} ({meanings[name]})" for name in missing)
-        raise ValueError(f"{place} needs {described}, which this study does not give: take it out of the list")
+        raise ValueError(f"{place} needs {described}, which this study does not give: remove it from the list")
     for item in model.inputs:
         values = np.array(known.get(item.name, ()))
         if values.size and not item.interval.contains(values).any():

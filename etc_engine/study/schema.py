@@ -41,7 +41,7 @@ def without_repeats(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """The values, refused if one stands twice."""
     repeated = [value for value, count in Counter(values).items() if count > 1]
     if repeated:
-        raise ValueError(f"{repeated[0]!r} is listed twice, each value may stand once")
+        raise ValueError(f"{repeated[0]!r} is listed twice: list each value once")
     return values
 
 

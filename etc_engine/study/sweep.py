@@ -89,10 +89,10 @@ class Study(StudyFile):
             values = self.values("pore_conductivity")
             if self.pores.gas is None and max(values) > 0.0:
                 raise ValueError(
-                    f"pores.conductivity: found {max(values):g}, {which} takes no heat through them: allowed is 0"
+                    f"pores.conductivity: found {max(values):g}, {which} does not model heat through them: allowed is 0"
                 )
             key = "radiation.emissivity" if self.pores.gas is None else "pores.gas"
-            raise ValueError(f"{key}: {which} takes no heat through the pores, take it out")
+            raise ValueError(f"{key}: {which} does not model heat through the pores: remove it")
         if row.pores == "must" and not every:
             key = "pore_conductivity" if self.pores.gas is None else "pressure"
             raise ValueError(
@@ -101,7 +101,7 @@ class Study(StudyFile):
             )
         if self.pores_rarefied and not row.gas:
             raise ValueError(
-                f"conduction.method: {which} takes neither a rarefied gas nor radiation: with it leave out "
+                f"conduction.method: {which} models neither a rarefied gas nor radiation: with it leave out "
                 "radiation.emissivity, pores.accommodation and, beside a gas, particles.material"
             )
 

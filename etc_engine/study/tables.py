@@ -109,7 +109,7 @@ class PackingTable(QuantityTable):
             raise ValueError(f"periodic: {error}") from None
         radii = distribution(self.radii)
         if self.method == "advancing-front" and self.count is not None:
-            raise ValueError("count has no meaning with method = 'advancing-front', which fills the box")
+            raise ValueError("count has no effect with method = 'advancing-front', which fills the box")
         if self.method == "advancing-front" and self.periodic:
             raise ValueError(
                 f"periodic: found {self.periodic!r}, 'advancing-front' fills a walled box; a periodic one takes "
@@ -118,7 +118,7 @@ class PackingTable(QuantityTable):
         if self.method == "advancing-front" and radii.scalable:
             raise ValueError(f"radii: found {self.radii!r}, 'advancing-front' needs a radius, such as 'equal:0.01'")
         if self.growth_rate is not None and self.method != "lubachevsky-stillinger":
-            raise ValueError(f"growth_rate has no meaning with method = {self.method!r}, take it out")
+            raise ValueError(f"growth_rate has no effect with method = {self.method!r}: remove it")
         return self
 
     def spec(self, density: float | None, *, radius_growth: bool) -> PackingSpec:

@@ -112,7 +112,7 @@ class Conduction(StudyTable):
         if self.method and self.method not in allowed:
             raise ValueError(unknown_method(self.engine, self.method, allowed))
         if self.dipoles and not any("dipoles" in ENGINES[self.engine].methods[word].options for word in self.words):
-            raise ValueError(f"dipoles have no meaning with engine = {self.engine!r}: a particle has one temperature")
+            raise ValueError(f"dipoles have no effect with engine = {self.engine!r}: a particle has one temperature")
         return self
 
     @property
@@ -158,7 +158,7 @@ class Source(StudyTable):
     def _check(self) -> Source:
         given = [key for key in ("particles", "ids", "types") if getattr(self, key) is not None]
         if len(given) > 1:
-            raise ValueError(f"{given[0]} and {given[1]} both choose particles, take one of them out")
+            raise ValueError(f"{given[0]} and {given[1]} both choose particles; remove one of them")
         return self
 
 
@@ -203,7 +203,7 @@ class PoresTable(StudyTable):
         if self.heat_capacity > 0.0 and not self.filled:
             raise ValueError("heat_capacity: the pores store heat only if they conduct, give a conductivity")
         if self.gas is not None and self.conductivity > 0.0:
-            raise ValueError("conductivity: has no meaning with gas, take it out")
+            raise ValueError("conductivity: has no effect with gas: remove it")
         return self
 
 
@@ -233,7 +233,7 @@ class Time(StudyTable):
         if self.scheme == "adaptive" and self.steps is not None:
             raise ValueError("steps: an adaptive scheme chooses them; give a tolerance")
         if self.scheme != "adaptive" and "tolerance" in self.model_fields_set:
-            raise ValueError(f"tolerance: has no meaning with scheme = {self.scheme!r}, only with 'adaptive'")
+            raise ValueError(f"tolerance: has no effect with scheme = {self.scheme!r}, only with 'adaptive'")
         if self.step is not None and self.steps is not None:
             raise ValueError("give step, in seconds, or steps, of each output interval, not both")
         if self.scheme != "adaptive" and self.step is None and self.steps is None:
@@ -312,7 +312,7 @@ class NetworkStudy(StudyFile):
         refuse_meaningless(self, "contacts")
         if self.contacts.roughness is not None:
             raise ValueError(
-                "contacts.roughness: a transient does not compute the resistance of rough contacts, take it out and "
+                "contacts.roughness: a transient does not compute the resistance of rough contacts: remove it and "
                 "give contacts.contact_resistance"
             )
 
@@ -339,21 +339,21 @@ class NetworkStudy(StudyFile):
         table, row = self.conduction, ENGINES[self.conduction.engine]
         named = self.particles.material is not None or self.pores.gas is not None or bool(self.radiation.emissivity)
         if self.particles.material is not None and "conductivity" in self.particles.model_fields_set:
-            raise ValueError("particles.conductivity: has no meaning with material, take it out")
+            raise ValueError("particles.conductivity: has no effect with material: remove it")
         try:  # at any temperature: which one is checked when it is known
             self.conditions(300.0 if table.nonlinear else table.temperature)
         except InputError as error:
             raise ValueError(f"pores: {error}") from None
         if table.temperature is not None and (table.nonlinear or not named):
             choice = "with nonlinear = true" if table.nonlinear else "without a material, a gas or radiation"
-            raise ValueError(f"conduction.temperature: has no meaning {choice}, take it out")
+            raise ValueError(f"conduction.temperature: has no effect {choice}: remove it")
         if self.particles.material is not None and table.temperature is None and not table.nonlinear:
             raise ValueError("conduction.temperature: missing, the conductivity of particles.material depends on it")
         if not table.nonlinear:
             return
         able = [name for name, method in row.methods.items() if method.local]
         if not named:
-            raise ValueError("conduction.nonlinear: nothing follows the temperature, give a material or a gas")
+            raise ValueError("conduction.nonlinear: no property depends on the temperature: give a material or a gas")
         if not able or (table.method and table.method not in able) or not self.pores_conduct:
             raise ValueError(
                 "conduction.nonlinear: properties follow the temperature with engine dtem, method facets and pores "
@@ -364,9 +364,7 @@ class NetworkStudy(StudyFile):
                 f"time.scheme: found {self.time.scheme!r}, allowed with nonlinear = true: {', '.join(NONLINEAR)}"
             )
         if self.motion is not None:
-            raise ValueError(
-                "conduction.nonlinear: properties do not follow the temperature with [motion], take it out"
-            )
+            raise ValueError("conduction.nonlinear: properties do not follow the temperature with [motion]: remove it")
 
     def _check_pores(self) -> None:
         """The method takes heat through the pores, or not, as they conduct."""
@@ -377,23 +375,25 @@ class NetworkStudy(StudyFile):
             what = "conduct" if conduct else "do not conduct"
             raise ValueError(f"conduction.method: found {word!r}, allowed where the pores {what}: {', '.join(able)}")
         if conduct and not able:
-            raise ValueError(f"pores.conductivity: engine {self.conduction.engine} takes no heat through the pores")
+            raise ValueError(
+                f"pores.conductivity: engine {self.conduction.engine} does not model heat through the pores"
+            )
         if conduct and self.motion is not None:
-            raise ValueError("pores.conductivity: with [motion] the pores do not conduct, take it out")
+            raise ValueError("pores.conductivity: with [motion] the pores do not conduct: remove it")
 
     def _check_motion(self, motion: Motion) -> None:
         """Frames of a dump, and their times."""
         file = self.packing
         if not isinstance(file, FileTable) or "frames" in file.model_fields_set or file.box is not None:
-            raise ValueError("motion: it takes all frames of a dump, the file of packing.files, and the dump's own box")
+            raise ValueError("motion: needs a dump in packing.files, with all of its frames and its box")
         if file.crop is not None:
-            raise ValueError("packing.crop: particles would come and go with [motion], take it out")
+            raise ValueError("packing.crop: particles would enter and leave with [motion]: remove it")
         if self.time.times:
-            raise ValueError("time.times: with [motion] the output times are those of the frames, take them out")
+            raise ValueError("time.times: with [motion] the output times are those of the frames; remove them")
         if self.time.scheme != "adaptive" and self.time.steps is None:
             raise ValueError("time.steps: with [motion] give the steps from frame to frame, or scheme = 'adaptive'")
         if self.conduction.dipoles:
-            raise ValueError("conduction.dipoles: how a disk turns from frame to frame is not known, take it out")
+            raise ValueError("conduction.dipoles: the rotation of a disk between frames is not known: remove it")
         if motion.expansion != 0.0 and self.contacts.rule != "overlap":
             raise ValueError("motion.expansion: radii change the contacts of rule = 'overlap' only")
 

@@ -59,11 +59,11 @@ class Wall(StudyTable):
         if self.type == "convective" and self.coefficient is None:
             raise ValueError("coefficient: missing, type = 'convective' needs one [W/(m2 K)]")
         if self.type != "convective" and self.coefficient is not None:
-            raise ValueError(f"coefficient: has no meaning with type = {self.type!r}, take it out")
+            raise ValueError(f"coefficient: has no effect with type = {self.type!r}: remove it")
         if self.type != "insulated" and self.value is None:
             raise ValueError(f"value: missing, type = {self.type!r} needs one")
         if self.type == "insulated" and self.value is not None:
-            raise ValueError("value: has no meaning with type = 'insulated', take it out")
+            raise ValueError("value: has no effect with type = 'insulated': remove it")
         return self
 
     def condition(self) -> WallCondition:

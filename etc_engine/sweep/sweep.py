@@ -260,7 +260,7 @@ def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize
     except (MemoryError, OSError) as error:
         place = "the packer's own density" if unit.density is None else f"density {unit.density:g}"
         raise OutputError(
-            f"realization {unit.realization} at {place} met a failure of the machine "
+            f"realization {unit.realization} at {place} failed because of the machine "
             f"({type(error).__name__}: {error}): make room and continue with --resume"
         ) from None
     except Exception as error:

@@ -185,7 +185,7 @@ def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Co
     trajectory = read_trajectory(path, motion.timestep, part_of(file))
     first = trajectory.packings[0]
     if trajectory.times.size < 2:
-        raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: take [motion] out")
+        raise StudyError(f"motion: {path} holds one frame, so there is nothing to march: remove [motion]")
     if first.box.periodic != parse_periodic(file.periodic or first.box.periodic_axes, first.dimension):
         raise StudyError(f"packing.files: expected a box periodic along {file.periodic!r}, found {first.box}")
     physics = _physics(study, trajectory.tables[0])

@@ -68,13 +68,13 @@ def conductivity_of(study: NetworkStudy, table: ParticleTable, temperature: floa
     if particles.material is not None:
         if particles.types is not None or table.conductivity is not None:
             what = "particles.types" if particles.types is not None else "a column 'conductivity' of the file"
-            raise StudyError(f"particles.material: {what} says what the particles are too, take one of them out")
+            raise StudyError(f"particles.material: {what} sets the conductivity too; remove one of them")
         assert temperature is not None
         return find_solid(particles.material).conductivity.at(temperature)
     if particles.types is not None:
         if given or table.conductivity is not None:
             what = "particles.conductivity" if given else "a column 'conductivity' of the file"
-            raise StudyError(f"particles.types: {what} says what the particles are too, take one of them out")
+            raise StudyError(f"particles.types: {what} sets the conductivity too; remove one of them")
         if table.types is None:
             raise StudyError("particles.types: the particles have no column of types")
         known = {str(word): value for word, value in particles.types.items()}
@@ -85,7 +85,7 @@ def conductivity_of(study: NetworkStudy, table: ParticleTable, temperature: floa
     if table.conductivity is None:
         return particles.conductivity
     if given:
-        raise StudyError("particles.conductivity: the particle file has a column of that name, take one of them out")
+        raise StudyError("particles.conductivity: the particle file has a column of that name; remove one of them")
     return table.conductivity
 
 
@@ -120,7 +120,7 @@ def _rows_of_ids(ids: list[int], table: ParticleTable, place: str) -> NDArray[np
         if ranked[at] != number:
             raise StudyError(f"{place}.ids: there is no particle with the id {number}")
         if at + 1 < ranked.size and ranked[at + 1] == number:
-            raise StudyError(f"{place}.ids: the id {number} stands for several particles")
+            raise StudyError(f"{place}.ids: the id {number} belongs to several particles")
     return np.asarray(order[found])
 
 

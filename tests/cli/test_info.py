@@ -87,5 +87,5 @@ def test_a_transient(etc_engine, tmp_path):
 def test_what_is_of_no_kind_is_refused(etc_engine, tmp_path):
     (tmp_path / "a.txt").write_text("hello\n")
     done = etc_engine("info", tmp_path / "a.txt")
-    assert (done.returncode, "not a format I know" in done.stderr) == (2, True)
+    assert (done.returncode, "not in a known format" in done.stderr) == (2, True)
     assert "no file of that name" in etc_engine("info", tmp_path / "none").stderr

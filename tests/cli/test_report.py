@@ -108,7 +108,7 @@ def test_other_boxes_show_the_system_size(made_sweep, result, tmp_path, etc_engi
     assert (tmp_path / "report.html").read_text(encoding="utf-8").count("data:image/png") == 4
     refused = etc_engine("report", result, other, "-o", tmp_path / "other.html")
     assert refused.returncode == 2
-    assert "result 2 is of another study: contacts is" in refused.stderr
+    assert "result 2 belongs to another study: contacts is" in refused.stderr
     assert not (tmp_path / "other.html").exists()
 
 

@@ -178,7 +178,7 @@ def test_a_box_wider_than_the_walls_is_named(etc_engine, chain):
         (("--crop", ",0.59:0.6"), "no centre lies in the crop"),
         (("--box", "1:0,0:1"), "must go from low to high"),
         (("--box", "x,y"), "--box takes edge lengths"),
-        (("--box", "1,1,1", "--dimension", "2"), "does not go with dimension 2"),
+        (("--box", "1,1,1", "--dimension", "2"), "does not fit dimension 2"),
         (("--periodic", "z"), "periodic axes 'z'"),
     ],
 )

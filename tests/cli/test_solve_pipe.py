@@ -57,7 +57,7 @@ def test_picture_alone(etc_engine, tmp_path):
         (["--method", "pipe"], "--method pipe is now --engine pipe --method chord"),
         (["--method", "pipe", "--pipe-resistance", "uniform"], "is now --engine pipe --method uniform"),
         (["--pipe-resistance", "uniform"], "--pipe-resistance uniform is now --engine pipe --method uniform"),
-        (["--engine", "pipe", "--modes", "3"], "modes means nothing to method chord of engine pipe"),
+        (["--engine", "pipe", "--modes", "3"], "modes has no effect with method chord of engine pipe"),
         (["--engine", "voxel"], "engine voxel resolves the pores: use etc-engine homogenize"),
     ],
 )

@@ -130,7 +130,7 @@ def test_conductivities_by_type(etc_engine, beds, tmp_path):
         ({"packing": 'radii = "equal:1"'}, "packing.radii"),
         ({"statistics": "realizations = 4"}, "the files hold 3 packings"),
         ({"statistics": "realizations = 2\nrelative_ci = 0.1"}, "relative_ci"),
-        ({"particles": "types = { 1 = 2.0 }\nconductivity = 3.0"}, "particles.conductivity: has no meaning"),
+        ({"particles": "types = { 1 = 2.0 }\nconductivity = 3.0"}, "particles.conductivity: has no effect"),
         ({"particles": 'types = { 1 = "unobtainium" }'}, "unobtainium"),
     ],
 )
@@ -148,7 +148,7 @@ def test_no_files_and_no_folder_are_named(etc_engine, beds, tmp_path):
     study = beds()
     text = study.read_text()
     study.write_text(text.replace("beds/*", "none/*"))
-    assert "no file is found by 'none/*.dump'" in etc_engine("sweep", study, "-o", tmp_path / "out.nc").stderr
+    assert "no file matches 'none/*.dump'" in etc_engine("sweep", study, "-o", tmp_path / "out.nc").stderr
     with pytest.raises(StudyError, match="packings in files are read by the command sweep"):
         parse_study(text)
 

@@ -112,7 +112,7 @@ def test_without_density_the_packer_decides():
             ("[statistics]", f'[models]\nnames = ["{name}"]\n[statistics]', ("models.names", repr(name), *words))
             for name, words in {
                 "kunii_smith": ("holds in 3D", "packing.box = [1.0, 1.0]"),
-                "hasselman_johnson": ("needs radius (inclusion radius), interface_conductance", "take it out"),
+                "hasselman_johnson": ("needs radius (inclusion radius), interface_conductance", "remove it"),
                 "lewis_nielsen": ("needs k1 (conductivity of the matrix) in (0, inf), found 0",),
             }.items()
         ),

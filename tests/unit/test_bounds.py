@@ -92,7 +92,7 @@ def test_contact_resistance_leaves_no_jump_in_the_mean():
 
 
 def test_other_methods_have_no_bounds(feng_particles):
-    with pytest.raises(InputError, match="bounds come with method exact, found a solution by chord"):
+    with pytest.raises(InputError, match="bounds are only available with method exact, found a solution by chord"):
         conductivity_bounds(effective_conductivity(medium_of(overlap_contacts(feng_particles)), axes=(0,)))
 
 

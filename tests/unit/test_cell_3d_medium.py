@@ -73,7 +73,7 @@ def test_what_is_refused(cubic):
     medium = Medium(cubic, 10.0, network, Pores(1.0))
     with pytest.raises(InputError, match="pores that conduct"):
         effective_conductivity(Medium(cubic, 10.0, network), method="cell")
-    with pytest.raises(InputError, match="option degree means nothing"):
+    with pytest.raises(InputError, match="option degree has no effect"):
         effective_conductivity(medium, method="cell", degree=4)
     with pytest.raises(InputError, match="positive and finite"):
         effective_conductivity(Medium(cubic, 0.0, network, Pores(1.0)), method="cell")

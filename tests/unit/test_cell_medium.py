@@ -38,7 +38,7 @@ def test_cell_is_the_default_where_the_pores_of_disks_conduct(feng_particles):
     assert np.abs(np.diag(result.tensor) / (0.3104213, 0.0813412) - 1.0).max() < 0.004
     assert (result.bounds[:, 0] < (0.3104213, 0.0813412)).all()
     assert (result.bounds[:, 1] > (0.3104213, 0.0813412)).all()
-    with pytest.raises(InputError, match=r"takes no heat through the pores: use .*cell"):
+    with pytest.raises(InputError, match=r"does not model heat through the pores: use .*cell"):
         effective_conductivity(medium, method="chord")
 
 

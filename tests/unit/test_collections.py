@@ -39,7 +39,7 @@ def test_a_crop_holds_for_all(beds):
 
 
 def test_what_is_not_there_or_has_changed_is_refused(beds):
-    with pytest.raises(InputError, match="no file is found by 'none/"):
+    with pytest.raises(InputError, match="no file matches 'none/"):
         find_sources(beds, "none/*.dump")
     with pytest.raises(InputError, match="holds 2 frames, numbered from 0: there is no frame 2"):
         find_sources(beds, "beds/*.dump", [2])

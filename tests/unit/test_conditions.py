@@ -47,8 +47,8 @@ def test_a_number_stands_for_the_gas():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"pressure": 1e5}, "give the gas by name"),
-        ({"accommodation": 0.5}, "give the gas by name"),
+        ({"pressure": 1e5}, "name one, such as helium"),
+        ({"accommodation": 0.5}, "name one, such as helium"),
         ({"gas": "helium", "temperature": 300.0}, "needs a pressure"),
         ({"gas": "helium", "pressure": 1e5}, "needs a temperature"),
         ({"emissivity": 0.5}, "needs a temperature"),
@@ -67,5 +67,5 @@ def test_pores_refuse_what_is_not_a_number(pores):
 
 def test_engines_say_what_they_cannot_take():
     medium = Medium(ONE, 10.0, overlap_contacts(ONE), Pores(1.0, jump_length=0.1))
-    with pytest.raises(InputError, match="takes neither the temperature jumps"):
+    with pytest.raises(InputError, match="models neither the temperature jumps"):
         find_engine("voxel").check(medium, "laminate")

@@ -79,7 +79,7 @@ def test_contacts_of_particles_that_were_cropped_away_are_left_out(files):
     [
         (CONTACTS.replace("0.8 0.5 0.5 0.4", "0.8 0.5 0.5 0.3"), PARTICLES, "give the frame of the same time step"),
         (CONTACTS.replace("30 20 0", "31 21 0").replace("30 10 1", "31 11 1"), PARTICLES, "names no contact"),
-        (CONTACTS, PARTICLES.replace("30 1", "10 1"), "the id 10 stands for several"),
+        (CONTACTS, PARTICLES.replace("30 1", "10 1"), "the id 10 belongs to several"),
         (CONTACTS, PARTICLES.replace("ATOMS id", "ATOMS mol"), "the particles have no ids"),
         (CONTACTS.replace("30 20 0", "30.5 20 0"), PARTICLES, "ids of particles must be whole numbers"),
         (CONTACTS.replace("ENTRIES\n2", "ENTRIES\n3"), PARTICLES, "3 entries are announced, 2 found"),

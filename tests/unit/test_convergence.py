@@ -52,5 +52,5 @@ def test_systems_are_sorted_by_size_and_must_be_of_one_study(made_sweep):
     assert np.allclose(systems["conductivity_mean"].isel(system=1).sel(density=0.6), 1.2)
     assert (systems["relative_spread"].isel(system=1) < 1e-12).all()
     assert (systems["relative_spread"].isel(system=0) > 1e-4).all()
-    with pytest.raises(InputError, match=r"result 2 is of another study: packing.density is 0.6"):
+    with pytest.raises(InputError, match=r"result 2 belongs to another study: packing.density is 0.6"):
         system_sizes([one, made_sweep(STUDY.replace("[0.6, 0.7]", "0.6"), conduct)])

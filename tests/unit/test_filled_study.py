@@ -63,20 +63,20 @@ SPEC = RealizationSpec(
         (
             'engine = "voxel"',
             'method = "chord"',
-            "conductivity: found 0.5, method 'chord' of engine 'dtem' takes no heat",
+            "conductivity: found 0.5, method 'chord' of engine 'dtem' does not model heat",
         ),
-        ('engine = "voxel"', 'engine = "pipe"', "method 'chord' of engine 'pipe' takes no heat"),
+        ('engine = "voxel"', 'engine = "pipe"', "method 'chord' of engine 'pipe' does not model heat"),
         ('engine = "voxel"', 'engine = ["voxel"]', r"conduction.engine: found \['voxel'\], allowed"),
         ("resolution = 32", "resolution = 1", "conduction.resolution: found 1, allowed: a whole number of at least"),
         ("conductivity = [5.0, 1.0]", "conductivity = [-1.0]", r"particles.conductivity\[0\]: found -1.0"),
         ("conductivity = [5.0, 1.0]", "conductivity = [1.0, 1.0]", "1.0 is listed twice"),
         ("conductivity = 0.5", "conductivity = -0.5", "pores.conductivity: found -0.5"),
         ('periodic = "xy"', 'periodic = "x"', "a box with walls all around or with none"),
-        ("[statistics]", "[contacts]\ncontact_resistance = 1.0\n[statistics]", "contact_resistance: has no meaning"),
-        ("[statistics]", '[contacts]\nrule = "bonded"\ncontact_angle = 5.0\n[statistics]', "contacts.rule: has no mea"),
+        ("[statistics]", "[contacts]\ncontact_resistance = 1.0\n[statistics]", "contact_resistance: has no effect"),
+        ("[statistics]", '[contacts]\nrule = "bonded"\ncontact_angle = 5.0\n[statistics]', "contacts.rule: has no effect"),
         ("[statistics]", "[models]\npore_conductivity = 0.1\n[statistics]", "unknown key, write pores.conductivity"),
-        ("resolution = 32", "resolution = 32\nparticles = 900", "conduction.particles: has no meaning"),
-        ("resolution = 32", "resolution = 32\nmodes = 3", "conduction.modes: has no meaning with engine = 'voxel'"),
+        ("resolution = 32", "resolution = 32\nparticles = 900", "conduction.particles: has no effect"),
+        ("resolution = 32", "resolution = 32\nmodes = 3", "conduction.modes: has no effect with engine = 'voxel'"),
         ("resolution = 32", "resolution = 100000", "conduction.resolution: .* GB of memory"),
         (
             "resolution = 32",
@@ -100,7 +100,7 @@ def test_what_a_study_may_not_say(old, new, words):
 
 def test_pores_that_conduct_need_a_method_that_heeds_them():
     text = STUDY.replace('engine = "voxel"', 'engine = "pipe"').replace("resolution = 32\n", "")
-    with pytest.raises(StudyError, match=r"pores.conductivity: found 0.5, method 'chord' of engine 'pipe' takes no"):
+    with pytest.raises(StudyError, match=r"pores.conductivity: found 0.5, method 'chord' of engine 'pipe' does not"):
         parse_study(text)
     assert parse_study(text.replace("conductivity = 0.5", "conductivity = 0.0")).values("pore_conductivity") == (0.0,)
 
@@ -111,7 +111,7 @@ def test_the_lattice_has_nodes_and_no_voxels_and_works_in_space():
         parse_study(plane)
     space = plane.replace("box = [1.0, 1.0]", "box = [1.0, 1.0, 1.0]").replace('"xy"', '"xyz"')
     assert parse_study(space).realization_spec(0.2).conduction[0].options["particles"] == 900
-    with pytest.raises(StudyError, match=r"conduction\.resolution: has no meaning with engine = 'lattice'"):
+    with pytest.raises(StudyError, match=r"conduction\.resolution: has no effect with engine = 'lattice'"):
         parse_study(space.replace("particles = 900", "resolution = 32"))
 
 

@@ -88,7 +88,7 @@ def test_cells_do_not_depend_on_the_order_or_the_origin():
     ("centers", "radii", "message"),
     [
         ([[0.5, 0.5], [0.5, 0.5]], [0.1, 0.1], "particles 0 and 1 have the same centre"),
-        ([[0.5, 0.5], [0.52, 0.5]], [0.3, 0.05], "particle 1 .* owns no Laguerre cell"),
+        ([[0.5, 0.5], [0.52, 0.5]], [0.3, 0.05], "particle 1 .* has no Laguerre cell"),
         ([[0.5, 0.5], [0.72, 0.5]], [0.25, 0.1], "the centre of particle 1 .* outside its own Laguerre cell"),
         ([[0.0, 0.5], [0.5, 0.5]], [0.1, 0.1], "the centre of particle 0 lies on a wall"),
     ],

@@ -69,7 +69,7 @@ def test_lattices_merge_their_vertices(places, edge, facets, vertices):
 
 def test_hidden_spheres_are_refused_by_number():
     centers = np.array([[0.3, 0.5, 0.5], [0.7, 0.5, 0.5], [0.32, 0.5, 0.5]])
-    with pytest.raises(GeometryError, match=r"sphere 2 .* owns no Laguerre cell"):
+    with pytest.raises(GeometryError, match=r"sphere 2 .* has no Laguerre cell"):
         laguerre_polygons(centers, np.array([0.2, 0.2, 0.01]), PERIODIC)
 
 

@@ -130,9 +130,9 @@ def test_every_row_of_the_table_does_what_it_says(engine, method, d):
             [Medium(packing, medium.conductivity, medium.network, Pores(0.1))], task, 7
         )
         assert refused.status == Status.ERROR
-        assert "takes no heat through the pores" in refused.message
+        assert "does not model heat through the pores" in refused.message
         assert refused.conductivity is None
-    with pytest.raises(InputError, match=f"option colour means nothing to method {method}"):
+    with pytest.raises(InputError, match=f"option colour has no effect with method {method}"):
         effective_conductivity(medium, engine=engine, method=method, colour=1)
 
 

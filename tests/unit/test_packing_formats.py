@@ -133,5 +133,5 @@ def test_a_netcdf_packing_that_keeps_the_reader_busy_is_given_up(tmp_path, monke
     write_particles(tmp_path / "a.nc", ParticleTable(packing))
     monkeypatch.setattr(netcdf, "NETCDF", "while True: pass")
     monkeypatch.setattr(apart, "SECONDS", 0.5)
-    with pytest.raises(InputError, match="does not come to an end"):
+    with pytest.raises(InputError, match="did not finish"):
         read_particles(tmp_path / "a.nc")

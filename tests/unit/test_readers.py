@@ -77,7 +77,7 @@ def test_standard_input(monkeypatch):
 
 def test_errors_name_standard_input(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"hello\n")))
-    with pytest.raises(InputError, match="standard input is not a format I know"):
+    with pytest.raises(InputError, match="standard input is not in a known format"):
         read_particles("-")
 
 
@@ -212,10 +212,10 @@ def test_variants_of_tables(tmp_path, text):
         ("x;y;radius\n0,25;0,5;0,25\n", "write decimals with a point"),
         ("0.25,0.5,0.25\n0.75,0.5,0.25\n", "a header such as 'x,y,radius' must come first"),
         ("x,y,radius\n0.25,0.5\n", "line 2: expected 3 values, found 2"),
-        ("x,y,x,radius\n0.25,0.5,1,1\n", "column 'x' stands there twice"),
-        ("a,b,c\n1,2,3\n", "not a format I know: its first line 'a,b,c'"),
-        ("LAMMPS data file\n\n2 atoms\n", "not a format I know: its first line 'LAMMPS data file'"),
-        ("xs,ys,radius\n0.25,0.5,1\n", "not a format I know"),
+        ("x,y,x,radius\n0.25,0.5,1,1\n", "column 'x' appears twice"),
+        ("a,b,c\n1,2,3\n", "not in a known format: its first line 'a,b,c'"),
+        ("LAMMPS data file\n\n2 atoms\n", "not in a known format: its first line 'LAMMPS data file'"),
+        ("xs,ys,radius\n0.25,0.5,1\n", "not in a known format"),
         ("x,y,mass\n0.25,0.5,1\n", "neither a radius nor a diameter"),
         ("", "is empty"),
     ],
@@ -228,7 +228,7 @@ def test_tables_refused_by_name(tmp_path, text, words):
 
 def test_binary_is_no_format_i_know(tmp_path):
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00")
-    with pytest.raises(InputError, match="not a format I know"):
+    with pytest.raises(InputError, match="not in a known format"):
         read_particles(tmp_path / "a.png")
     with pytest.raises(InputError, match="cannot be read"):
         read_particles(tmp_path)

@@ -82,7 +82,7 @@ def test_a_reader_that_does_not_end_is_given_up(dataset, tmp_path, monkeypatch):
     write_dataset(dataset, tmp_path / "out.nc")
     monkeypatch.setattr(result_file, "NETCDF", "while True: pass")
     monkeypatch.setattr(apart, "SECONDS", 0.5)
-    with pytest.raises(OutputError, match="does not come to an end"):
+    with pytest.raises(OutputError, match="did not finish"):
         open_dataset(tmp_path / "out.nc")
 
 

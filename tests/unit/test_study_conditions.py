@@ -115,16 +115,16 @@ def test_the_result_holds_the_conductivities_that_follow():
     [
         ("temperature = [400.0, 800.0]\n", "", "a gas needs a temperature"),
         ("pressure = [1e3, 1e5]\n", "", "a gas needs a pressure"),
-        ('gas = "helium"\n', "", "a pressure is of a gas"),
+        ('gas = "helium"\n', "", "a pressure needs a gas"),
         ('gas = "helium"', 'gas = "phlogiston"', "pores.gas: "),
         ('"alumina"', '"phlogiston"', "particles.material: there is no material named 'phlogiston'"),
         ("[400.0, 800.0]", "[400.0, 9000.0]", "9000"),
-        ('gas = "helium"', 'gas = "helium"\nconductivity = 0.1', "pores.conductivity: has no meaning with gas"),
-        ('"alumina"', '"alumina"\nconductivity = 3.0', "particles.conductivity: has no meaning with material"),
+        ('gas = "helium"', 'gas = "helium"\nconductivity = 0.1', "pores.conductivity: has no effect with gas"),
+        ('"alumina"', '"alumina"\nconductivity = 3.0', "particles.conductivity: has no effect with material"),
         ("youngs_modulus = 370e9\n", "", "rule = 'load' needs youngs_modulus"),
         ("load = 2e4\n", "", "rule = 'load' needs load"),
-        ('material_curve = "full"', 'method = "chord"', "takes no heat through the pores"),
-        ('material_curve = "full"', 'engine = "voxel"', "takes neither a rarefied gas nor radiation"),
+        ('material_curve = "full"', 'method = "chord"', "does not model heat through the pores"),
+        ('material_curve = "full"', 'engine = "voxel"', "models neither a rarefied gas nor radiation"),
         ("emissivity = 0.6", "emissivity = 1.6", "a number from 0 to 1"),
         (
             "coordination = 4.0",
@@ -146,7 +146,7 @@ def test_what_is_missing_or_out_of_range_is_refused_in_one_line(old, new, messag
 
 
 def test_a_temperature_alone_means_nothing():
-    with pytest.raises(StudyError, match="has no meaning without a material, a gas or radiation"):
+    with pytest.raises(StudyError, match="has no effect without a material, a gas or radiation"):
         parse_study(DISKS + "[conduction]\ntemperature = 300.0\n")
 
 
@@ -284,7 +284,7 @@ def test_the_result_between_walls_has_its_heat_balance_and_its_means(made_sweep)
         ("temperature_difference = [2.0, 200.0]\n", "", "conduction.temperature_difference: missing"),
         ("[2.0, 200.0]", "[2.0, 800.0]", "the cold wall would be at 0 K"),
         ("[2.0, 200.0]", "[2.0, 700.0]", "particles.material: at the wall of 50 K"),
-        ("nonlinear = true\n", "", "conduction.temperature_difference: has no meaning with nonlinear = 'false'"),
+        ("nonlinear = true\n", "", "conduction.temperature_difference: has no effect with nonlinear = 'false'"),
         ("nonlinear = true\n", 'method = "cell"\nnonlinear = true\n', "conduction.method: method 'cell'"),
     ],
 )

@@ -100,5 +100,5 @@ def test_a_damaged_tiff_that_keeps_the_reader_busy_is_given_up(tmp_path, monkeyp
     content[second] ^= 0x20
     path.write_bytes(content)
     monkeypatch.setattr(apart, "SECONDS", 2.0)
-    with pytest.raises(InputError, match="read as TIFF: the reading library does not come to an end within 2"):
+    with pytest.raises(InputError, match="read as TIFF: the reading library did not finish within 2"):
         read_image(path)

@@ -125,7 +125,7 @@ def _elements(links: FacetLinks, material: FacetMaterial, sides: FacetSides, *, 
     if bad >= 0:
         cure = "leave the dipoles out or use smaller contacts" if dipoles else "use smaller contacts"
         raise GeometryError(
-            f"sphere {bad} has no positive definite resistance to heat that it stores (method facets): {cure}"
+            f"sphere {bad} has a storage resistance that is not positive definite (method facets): {cure}"
         )
     return elements
 

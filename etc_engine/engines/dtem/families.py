@@ -125,7 +125,7 @@ def _solve_alike(media: Sequence[Medium], conduction: Conduction) -> list[Result
         return family.solve(media, replace(conduction, method=method, options={}))
     for name, neutral in family.foreign.items():
         if conduction.options.get(name, neutral) != neutral:
-            raise InputError(f"option {name} means nothing to method {method} in {media[0].dimension}D: leave it out")
+            raise InputError(f"option {name} has no effect with method {method} in {media[0].dimension}D: leave it out")
     own = {name: value for name, value in conduction.options.items() if name not in family.foreign}
     return family.solve(media, replace(conduction, options=own))
 

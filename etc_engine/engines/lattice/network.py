@@ -138,7 +138,7 @@ def laguerre_lattice(packing: ParticlePacking) -> Lattice:
         )
     if (facets.volumes == 0.0).any():
         raise GeometryError(
-            f"sphere {int(np.argmin(facets.volumes))} owns no Laguerre cell: it lies within others; remove it"
+            f"sphere {int(np.argmin(facets.volumes))} has no Laguerre cell: it lies within others; remove it"
         )
     return Lattice(
         packing,

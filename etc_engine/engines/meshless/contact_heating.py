@@ -253,7 +253,7 @@ def _fine_enough(arcs: Sequence[ContactArc]) -> Discretization:
         if 2.0 * np.pi * 2 / narrowest > MOST_CELLS:
             raise GeometryError(
                 f"a contact half-angle of {narrowest:.3g} rad is too narrow for {MOST_CELLS} boundary nodes: "
-                "give a discretization of your own"
+                "give your own discretization"
             )
         cells = MOST_CELLS
     # the flux jumps at the ends of the arcs, which no smooth function follows point by point

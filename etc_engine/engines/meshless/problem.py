@@ -245,7 +245,7 @@ def sample(data: Data, points: Floats, t: float, what: str) -> Floats:
         raise InputError(f"{what} must be real numbers, found {values!r}") from error
     if values.shape not in ((), (len(points),)):
         raise InputError(
-            f"{what} answered an array of shape {values.shape} for positions of shape {points.shape}: "
+            f"{what} returned an array of shape {values.shape} for positions of shape {points.shape}: "
             f"expected ({len(points)},) or one number (x[:, 0] is the first coordinate)"
         )
     if not np.isfinite(values).all():
@@ -271,7 +271,7 @@ def transformed(data: Data, transform: Transform | None, points: Floats, s: comp
     values = np.asarray(transform(points, s), dtype=complex)
     if values.shape not in ((), (len(points),)) or not np.isfinite(values).all():
         raise InputError(
-            f"the Laplace transform of {what} answered shape {values.shape} (or values that are not finite) "
+            f"the Laplace transform of {what} returned shape {values.shape} (or values that are not finite) "
             f"for {len(points)} positions at s = {s:g}"
         )
     return np.broadcast_to(values, (len(points),)).copy()

@@ -98,7 +98,7 @@ def _order_ratios(highest: int, lam: complex) -> Field:
     """I_{n+1}(lambda)/I_n(lambda) for n = 0 .. highest - 1, by the stable backward recurrence."""
     if not abs(lam) <= STEEPEST:
         raise ConvergenceError(
-            f"heat goes {1.0 / abs(lam):.1e} of the body's radius in a step, too short a way to resolve (least "
+            f"heat moves {1.0 / abs(lam):.1e} of the body's radius in a step, too short to resolve (least "
             f"{1.0 / STEEPEST:.0e}): check conductivity, heat capacity and times"
         )
     extra = highest + 20 + int(2.0 * abs(lam))

@@ -174,7 +174,7 @@ def _contacts(links: FacetLinks, polygons: LaguerrePolygons) -> tuple[Floats, Fl
         face = places.get(key, places.get(other))
         if face is None:
             raise GeometryError(
-                f"the contact between {what} has no Laguerre facet: others stand between them; take the contact out"
+                f"the contact between {what} has no Laguerre facet: others stand between them; remove the contact"
             )
         radii[face], resistances[face] = links.contacts[link], links.bonds[link]
     return radii, resistances

@@ -49,7 +49,7 @@ def energy_bounds(solution: SteadySolution) -> Floats:
     cent of the distance of the two bounds). The first two widen the bounds.
     """
     if solution.method != "exact":
-        raise InputError(f"bounds come with method exact, found a solution by {solution.method}")
+        raise InputError(f"bounds are only available with method exact, found a solution by {solution.method}")
     energies = np.diag(solution.energies)
     bounds = np.empty((energies.size, 2))
     for load, (energy, report) in enumerate(zip(energies, solution.reports, strict=True)):
