@@ -73,7 +73,7 @@ SPEC = RealizationSpec(
         ("conductivity = 0.5", "conductivity = -0.5", "pores.conductivity: found -0.5"),
         ('periodic = "xy"', 'periodic = "x"', "a box with walls all around or with none"),
         ("[statistics]", "[contacts]\ncontact_resistance = 1.0\n[statistics]", "contact_resistance: has no effect"),
-        ("[statistics]", '[contacts]\nrule = "bonded"\ncontact_angle = 5.0\n[statistics]', "contacts.rule: has no effect"),
+        ("[statistics]", '[contacts]\nrule = "bonded"\ncontact_angle = 5.0\n[statistics]', "contacts.rule: has no eff"),
         ("[statistics]", "[models]\npore_conductivity = 0.1\n[statistics]", "unknown key, write pores.conductivity"),
         ("resolution = 32", "resolution = 32\nparticles = 900", "conduction.particles: has no effect"),
         ("resolution = 32", "resolution = 32\nmodes = 3", "conduction.modes: has no effect with engine = 'voxel'"),
