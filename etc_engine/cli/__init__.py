@@ -61,6 +61,12 @@ class CommandTable(click.Group):
             raise TypeError(f"{COMMANDS[cmd_name]} is not a click command")
         return command
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The commands, each with the whole first sentence of its help."""
+        rows = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.get_short_help_str(limit=200)) for name, command in rows if command])
+
 
 def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
     if not wanted or ctx.resilient_parsing:
@@ -75,7 +81,7 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
     ctx.exit()
 
 
-@click.command(cls=CommandTable, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(cls=CommandTable, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
     is_flag=True,
@@ -84,8 +90,17 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool
     callback=_print_version,
     help="Show the version and exit.",
 )
-def cli() -> None:
-    """Effective thermal conductivity of particle systems, and its statistics over random realizations."""
+@click.pass_context
+def cli(ctx: click.Context) -> None:
+    """Effective thermal conductivity of particle systems, and its statistics over random realizations.
+
+    etc-engine COMMAND --help explains a command.
+
+    Completion of commands and options in bash: eval "$(_ETC_ENGINE_COMPLETE=bash_source etc-engine)". For zsh and fish
+    the words are zsh_source and fish_source.
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

@@ -20,16 +20,16 @@ OPTIONS = (
     click.option(
         "--contacts",
         type=click.Path(path_type=Path),
-        help="Contact dump (ITEM: ENTRIES) of the same time step, whose contacts replace overlaps.",
+        help="Contact dump (ITEM: ENTRIES) of the same time step. Its contacts replace overlaps.",
     ),
     click.option(
         "--contact-width",
         type=click.Choice(("area", "force")),
-        help="Width of the contacts of the dump: from their area (default where there is one) or force.",
+        help="Width of the contacts of the dump. By default area where the dump has one.",
     ),
     click.option(
         "--contact-columns",
-        help="Words of the dump's compute pair/gran/local, such as 'pos id force contactArea heatFlux'.",
+        help="Columns of the dump by the words of compute pair/gran/local: 'pos id force contactArea heatFlux'.",
     ),
 )
 

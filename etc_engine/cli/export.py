@@ -31,14 +31,15 @@ class _Format(click.ParamType):
 @click.command("export")
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option("--to", "form", type=_Format(), required=True, help="Format of the file.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write; standard output if left out.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="File to write. By default standard output.")
 @click.option("--at", "fixed", multiple=True, metavar="NAME=VALUE", help="Keep one value of a dimension of the sweep.")
 def export_command(result: Path, form: str, output: Path | None, fixed: tuple[str, ...]) -> None:
     """Write the conductivity of the sweep in RESULT (netCDF) over temperature for another program.
 
-    Means with their confidence intervals, and a polynomial in temperature whose order the intervals choose; its
-    residual stands in the comments. csv: every cell. moose: input blocks. comsol: an interpolation file. openfoam:
-    the transport dictionary of a solid.
+    The file holds means with their confidence intervals, and a polynomial in temperature. The intervals choose its
+    order. Its residual stands in the comments.
+
+    csv: every cell. moose: input blocks. comsol: an interpolation file. openfoam: the transport dictionary of a solid.
     """
     from etc_engine.cli.options import check_place
     from etc_engine.durable.files import replacing

@@ -29,28 +29,34 @@ LATTICE_PARTICLES = 20_000
 @click.argument("inclusions", type=click.Path(path_type=Path))
 @particle_options
 @image_options
-@click.option("--engine", default="voxel", show_default=True, help="voxel: FFT on voxels; lattice: particles.")
-@click.option("--method", help="Of voxel: laminate or binary, the kind of voxel; of lattice: laguerre or contact.")
+@click.option(
+    "--engine",
+    default="voxel",
+    show_default=True,
+    metavar="voxel|lattice",
+    help="voxel: FFT on voxels. lattice: a network of many small particles.",
+)
+@click.option("--method", metavar="WORD", help="voxel: laminate or binary voxels. lattice: laguerre or contact.")
 @click.option("--matrix", type=float, help="Conductivity of the matrix [W/(m K)].")
 @click.option(
-    "--inclusion", type=float, help="Conductivity of the inclusions [W/(m K)]; a column of the file is used instead."
+    "--inclusion", type=float, help="Conductivity of the inclusions [W/(m K)]. By default the column of the file."
 )
 @click.option(
     "--boundary",
     type=click.Choice(("periodic", "walls")),
-    help="periodic (default of CSV), or walls: two isothermal faces, the others adiabatic. By default as the box.",
+    help="walls: two isothermal faces, the others adiabatic. By default as the box, of CSV periodic.",
 )
-@click.option("--resolution", type=int, help="voxel: voxels along the shortest edge; 64 by default.")
-@click.option("--solver", help="voxel: iteration; cg by default.")
-@click.option("--green", help="voxel: Green operator; default rotated.")
+@click.option("--resolution", type=int, help="voxel: voxels along the shortest edge. By default 64.")
+@click.option("--solver", help="voxel: iteration, cg or eyre-milton. By default cg.")
+@click.option("--green", help="voxel: Green operator. By default rotated.")
 @click.option("--voxels", hidden=True)
-@click.option("--particles", type=int, help="lattice: number of particles, about; 20000 by default.")
-@click.option("--seed", type=int, help="lattice: seed of its particles; 1 by default.")
+@click.option("--particles", type=int, help="lattice: number of particles, about. By default 20000.")
+@click.option("--seed", type=int, help="lattice: seed of its particles. By default 1.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with inclusions and result.")
 @click.option(
     "--plot",
     type=click.Path(path_type=Path),
-    help="voxel: picture of voxels and heat flux; of spheres a section through the largest area of inclusions.",
+    help="voxel: picture of voxels and heat flux. Of spheres the section with the largest area of inclusions.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def homogenize_command(
@@ -64,11 +70,11 @@ def homogenize_command(
 ) -> None:
     """Effective conductivity tensor of disks or spheres in a matrix.
 
-    INCLUSIONS is a CSV file with the columns x,y,radius or x,y,z,radius (optionally conductivity), a LAMMPS/LIGGGHTS
-    text dump, a netCDF or VTK file as ``pack`` writes it, or a file of another DEM code; or a voxel image of
-    labelled phases (.npy, TIFF, raw), of which --phases gives the conductivities. Overlapping inclusions count as
-    their union; where their conductivities differ the radical plane divides them. 0 insulates, inf conducts
-    perfectly.
+    INCLUSIONS is a file of particles as etc-engine solve reads it, or a voxel image of labelled phases (.npy, TIFF,
+    raw). --phases gives the conductivities of an image.
+
+    Overlapping inclusions count as their union. Where their conductivities differ the radical plane divides them. A
+    conductivity of 0 insulates, inf conducts perfectly.
     """
     start = time.perf_counter()
     import numpy as np

@@ -29,7 +29,8 @@ def info_command(file: Path, study: bool, as_json: bool) -> None:
     """Print what FILE holds and where it comes from: a sweep, a transient, a single solve, a packing, a dump.
 
     Of results: study, seed, versions, commit, command, hosts, times, and how cells ended.
-    `etc-engine info FILE.nc --study > again.toml` gives the study back, ready to be run again.
+
+    etc-engine info FILE.nc --study > again.toml writes the study again, ready to run.
     """
     from etc_engine.cli.options import print_json
 

@@ -15,7 +15,7 @@ ATMOSPHERE = 101325.0
 @click.command("materials")
 @click.argument("name", required=False)
 @click.option("--temperature", type=float, help="Temperature [K] at which to evaluate.")
-@click.option("--pressure", type=float, help="Pressure of a gas [Pa]; 101325 if left out, 0 is vacuum.")
+@click.option("--pressure", type=float, help="Pressure of a gas [Pa]. 0 is vacuum. By default 101325.")
 @click.option("--accommodation", type=float, help="Accommodation coefficient of a surface: adds the jump length.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def materials_command(
@@ -24,7 +24,7 @@ def materials_command(
     """List the materials, show the record of one, or evaluate it at a temperature.
 
     Without NAME: every solid and gas. With NAME alone: its properties, their ranges and sources. With
-    --temperature: its values there; a temperature outside the range of a source is refused.
+    --temperature: its values there. A temperature outside the range of a source is refused.
     """
     from etc_engine.cli.options import print_json
     from etc_engine.errors import InputError

@@ -9,10 +9,12 @@ import click
 
 @click.command("models")
 @click.argument("name", required=False)
-@click.option("--k1", type=float, help="Conductivity of phase 1 (matrix, fluid, pores) [W/(m K)]; 0 and inf allowed.")
-@click.option("--k2", type=float, help="Conductivity of phase 2 (inclusions, solid) [W/(m K)]; 0 and inf allowed.")
+@click.option(
+    "--k1", type=float, help="Conductivity of phase 1 (matrix, fluid, pores) [W/(m K)]. 0 and inf are allowed."
+)
+@click.option("--k2", type=float, help="Conductivity of phase 2 (inclusions, solid) [W/(m K)]. 0 and inf are allowed.")
 @click.option("--fraction", type=float, help="Fraction of phase 2, 0 to 1.")
-@click.option("--dimension", type=int, help="2 (disks) or 3 (spheres); may be left out where only one is possible.")
+@click.option("--dimension", type=int, help="2 (disks) or 3 (spheres). Needed where both are possible.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A further parameter of the model.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def models_command(

@@ -55,7 +55,7 @@ def check_picture(path: Path) -> None:
     if path.suffix.lower() not in PICTURES:
         raise InputError(f"a picture is written as {', '.join(PICTURES)}: found {str(path)!r}")
     if find_spec("matplotlib") is None:
-        raise InputError("pictures need matplotlib: install the extra with pip install 'etc-engine[plot]'")
+        raise InputError("pictures need matplotlib: install it with pip install '.[plot]' in the folder of etc_engine")
 
 
 RESULT_MARKS = (b"study_digest", b"study_file")

@@ -22,7 +22,8 @@ STDOUT = Path("-")
     "--method",
     default="advancing-front",
     show_default=True,
-    help="advancing-front (2D, walls), lubachevsky-stillinger or random-sequential.",
+    help="advancing-front: disks between walls, each touching others. lubachevsky-stillinger: disks or spheres, up to "
+    "jamming. random-sequential: disks or spheres, loose.",
 )
 @click.option("--growth-rate", type=float, help="Growth rate of lubachevsky-stillinger.")
 @click.option(
@@ -32,20 +33,21 @@ STDOUT = Path("-")
 )
 @click.option("--box", required=True, help="Edge lengths, such as 1,1 or 1,1,1.")
 @click.option("--count", type=int, help="Number of particles.")
-@click.option("--density", type=float, help="Sum of the particle areas (volumes) over the box's.")
-@click.option("--periodic", default="", help="Periodic axes: x, y, xy or xyz; walls elsewhere.")
-@click.option("--seed", type=int, help="Seed of the random stream; a new one is drawn and told without it.")
+@click.option("--density", type=float, help="Sum of the particle areas (volumes) over that of the box.")
+@click.option("--periodic", default="", help="Periodic axes: x, y, xy or xyz. Walls elsewhere.")
+@click.option("--seed", type=int, help="Seed of the random stream. By default one is drawn and printed.")
 @click.option(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
     required=True,
-    help="File to write: .csv, .dump or .lammpstrj (LAMMPS), .nc (netCDF) or .vtp (VTK); - is CSV on stdout.",
+    help="File to write: .csv, .dump or .lammpstrj (LAMMPS), .nc (netCDF) or .vtp (VTK). - is CSV on stdout.",
 )
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the packing and its structure.")
 @click.option(
-    "--contact-gap", type=float, default=1e-6, show_default=True, help="Largest gap of a contact told, in mean radii."
+    "--bond-gap", type=float, default=1e-6, show_default=True, help="Largest gap of a contact counted, in mean radii."
 )
+@click.option("--contact-gap", hidden=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def pack_command(
     method: str,
@@ -58,7 +60,8 @@ def pack_command(
     seed: int | None,
     output: Path,
     plot: Path | None,
-    contact_gap: float,
+    bond_gap: float,
+    contact_gap: str | None,
     as_json: bool,
 ) -> None:
     """Make a random packing and write it to a file, in the format of its ending."""
@@ -77,8 +80,10 @@ def pack_command(
 
     if seed is not None and seed < 0:
         raise InputError(f"--seed must not be negative, found {seed}")
-    if not 0.0 <= contact_gap <= 1.0:
-        raise InputError(f"--contact-gap must lie between 0 and 1 mean radius, found {contact_gap:g}")
+    if contact_gap is not None:
+        raise InputError(f"--contact-gap {contact_gap} is now --bond-gap {contact_gap}, the same word as in solve")
+    if not 0.0 <= bond_gap <= 1.0:
+        raise InputError(f"--bond-gap must lie between 0 and 1 mean radius, found {bond_gap:g}")
     spec = PackingSpec(
         method=method,
         radii=parse_radii(radii),
@@ -96,7 +101,7 @@ def pack_command(
     with PackingProgress() as progress:
         packing = pack(spec, default_rng(seed), progress.report)
     seconds = time.perf_counter() - start
-    contacts = neighbor_pairs(packing, relative_gap=contact_gap).count
+    contacts = neighbor_pairs(packing, relative_gap=bond_gap).count
     options = {
         "method": method,
         "growth-rate": growth_rate,
@@ -116,7 +121,7 @@ def pack_command(
         from etc_engine.output.figures import save_structure
 
         with replacing(plot) as file:
-            save_structure(packing, file, contact_gap)
+            save_structure(packing, file, bond_gap)
     record = {
         "particles": packing.count,
         "density": packing.density,

@@ -19,16 +19,18 @@ if TYPE_CHECKING:
 
 OPTIONS = (
     click.option(
-        "--box", help="Edge lengths (1,1) or faces (0:1,0:2), in the file's coordinates; replaces the file's."
+        "--box", help="Edge lengths (1,1) or faces (0:1,0:2), in the coordinates of the file. Replaces its box."
     ),
-    click.option("--periodic", help="Periodic axes: x, y, xy, ..., walls elsewhere; replaces the file's."),
+    click.option("--periodic", help="Periodic axes: x, y, xy, ... Walls elsewhere. Replaces what the file says."),
     click.option(
-        "--crop", help="Part to keep, low:high per axis, such as 0:1,0.2:0.8 or ,0:0.024; its faces are walls."
+        "--crop", help="Part to keep, low:high per axis, such as 0:1,0.2:0.8 or ,0:0.024. Its faces are walls."
     ),
-    click.option("--frame", type=int, help="Frame of a file with several, from 0; the last one by default."),
-    click.option("--dimension", type=click.Choice(("2", "3")), help="2: disks, 3: spheres; where the file cannot say."),
+    click.option("--frame", type=int, help="Frame of a file with several, from 0. By default the last."),
+    click.option(
+        "--dimension", type=click.Choice(("2", "3")), help="2 for disks, 3 for spheres, where the file does not say."
+    ),
     click.option("--types", help="Conductivity of each type of particle of the file [W/(m K)], such as 1=2.4,2=16."),
-    click.option("--radius-column", help="Name of the column of radii, where it is not radius or diameter."),
+    click.option("--radius-column", help="Name of the column of radii. By default radius or diameter."),
 )
 
 

@@ -18,27 +18,27 @@ if TYPE_CHECKING:
 OPTIONS = (
     click.option(
         "--rule",
-        help="Contact rule: overlap, bonded, radius, coordination, hertz or load; by default what the options fit.",
+        help="Contact rule: overlap, bonded, radius, coordination, hertz or load. By default as the options say.",
     ),
     click.option("--contact-radius", type=float, help="Radius of bonded contacts [m], instead of --contact-angle."),
     click.option(
         "--coordination",
         type=float,
-        help="With --rule coordination or load: mean coordination number; the closest pairs touch, as many as give it.",
+        help="Mean coordination number that the closest pairs make. With --rule coordination or load.",
     ),
     click.option("--youngs-modulus", type=float, help="Young's modulus of the particles [Pa]."),
     click.option("--poisson-ratio", type=float, help="Poisson's ratio of the particles."),
     click.option(
-        "--simulated-modulus", type=float, help="With --rule hertz: Young's modulus that the DEM run used [Pa]."
+        "--simulated-modulus", type=float, help="Young's modulus that the DEM run used [Pa]. With --rule hertz."
     ),
-    click.option("--load", type=float, help="With --rule load: mean stress carried by the contacts [Pa]."),
+    click.option("--load", type=float, help="Mean stress carried by the contacts [Pa]. With --rule load."),
     click.option("--roughness", help="Height [m], slope and hardness [Pa] of rough contacts: 1e-6,0.1,4e9."),
-    click.option("--material", help="Solid by name instead of --conductivity; needs --temperature."),
-    click.option("--gas", help="Gas in the pores by name, such as helium."),
-    click.option("--pressure", type=float, help="Pressure of the gas [Pa]; 0 is vacuum."),
+    click.option("--material", help="Solid by name, see etc-engine materials. Needs --temperature."),
+    click.option("--gas", help="Gas in the pores by name, see etc-engine materials."),
+    click.option("--pressure", type=float, help="Pressure of the gas [Pa]. 0 is vacuum."),
     click.option("--temperature", type=float, help="Temperature of properties and radiation [K]."),
     click.option("--accommodation", type=float, help="Thermal accommodation coefficient of the surfaces, up to 1."),
-    click.option("--emissivity", type=float, help="Emissivity of the particles: facing surfaces radiate."),
+    click.option("--emissivity", type=float, help="Emissivity of the particles. Facing surfaces radiate."),
     click.option(
         "--wall-temperatures",
         help="Temperatures of the walls at the low and the far end [K], 900:600: properties follow the local "

@@ -18,7 +18,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 def server_options(command: F) -> F:
     """The options ``--server`` and ``--token-file``."""
     token = click.option(
-        "--token-file", type=click.Path(path_type=Path), help="File with the token; or ETC_ENGINE_TOKEN."
+        "--token-file",
+        type=click.Path(path_type=Path),
+        help="File with the token. By default ETC_ENGINE_TOKEN holds it.",
     )
     default = "http://127.0.0.1:8765"
     server = click.option(

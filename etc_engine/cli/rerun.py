@@ -17,7 +17,7 @@ EXIT_DIFFERENT = 1
 
 @click.command("rerun")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--density", type=float, help="Density of the cell; may be left out if the file has one.")
+@click.option("--density", type=float, help="Density of the cell. Needed where the file has several.")
 @click.option("--realization", type=int, required=True, help="Number of the realization, from 0.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def rerun_command(file: Path, density: float | None, realization: int, as_json: bool) -> int:

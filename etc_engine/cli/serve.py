@@ -29,12 +29,14 @@ def _number(_context: click.Context, _option: click.Parameter, value: float) -> 
 
 @click.command("serve")
 @click.option("--data", required=True, callback=_place, help="Data directory: queue and results.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; any other needs a token.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on. Any other needs a token.")
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0 takes a free one.")
 @click.option("--ranks", type=click.IntRange(1, MOST_RANKS), default=1, show_default=True, help="MPI ranks of a study.")
 @click.option("--launcher", type=click.Choice(["local", "slurm"]), default="local", show_default=True)
 @click.option("--sbatch", default="", help="Further options of sbatch, such as '--partition=short --time=2:00:00'.")
-@click.option("--token-file", type=click.Path(path_type=Path), help="File with the token; or ETC_ENGINE_TOKEN.")
+@click.option(
+    "--token-file", type=click.Path(path_type=Path), help="File with the token. By default ETC_ENGINE_TOKEN holds it."
+)
 @click.option("--allow-host", "hosts", multiple=True, help="Another name of this service, such as that of a proxy.")
 @click.option("--max-units", type=click.IntRange(1), default=100_000, show_default=True, help="Packings of a study.")
 @click.option("--max-particles", type=click.IntRange(1), default=1_000_000, show_default=True, help="Of a packing.")
@@ -70,7 +72,7 @@ def serve_command(
         from etc_engine.service.server import serve
     except ModuleNotFoundError as error:
         raise InputError(
-            f"the service needs {error.name}: install the extra with pip install 'etc-engine[service]'"
+            f"the service needs {error.name}: install it with pip install '.[service]' in the folder of etc_engine"
         ) from None
     from etc_engine.service.accounts import exposures
     from etc_engine.service.launchers import find_mpiexec

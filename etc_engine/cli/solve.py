@@ -30,23 +30,34 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
 @click.command("solve")
 @click.argument("particles", type=click.Path(path_type=Path))
 @particle_options
-@click.option("--axis", help="Load axis: x (the default), y, z or all.")
-@click.option("--engine", default="dtem", show_default=True, help="dtem: thermal elements; pipe: pipe network.")
+@click.option("--axis", help="Load axis: x, y, z or all. By default x, in a periodic box all.")
+@click.option(
+    "--engine",
+    default="dtem",
+    show_default=True,
+    metavar="dtem|pipe",
+    help="dtem: thermal elements. pipe: pipe network of DEM codes.",
+)
 @click.option(
     "--method",
-    help="Of dtem: chord, standard, enhanced, arc, exact, cell (disks or spheres) or facets (spheres, where the pores "
-    "conduct); of pipe: chord or uniform, for spheres also holm or root-area. By default the first that fits.",
+    metavar="WORD",
+    help="dtem: chord, standard, enhanced, arc or exact. Where the pores conduct: cell or, for spheres, facets. "
+    "pipe: chord or uniform, for spheres also holm or root-area. By default the first that fits.",
 )
 @click.option("--pipe-resistance", hidden=True)
-@click.option("--modes", type=int, help="Flux modes of a contact, with --method exact or arc.")
-@click.option("--degree", type=int, help="Polynomial degree on the edges of cells, with --method cell: 1 to 5.")
-@click.option("--bounds", is_flag=True, help="Rigorous bounds too, with --method cell and few disks.")
+@click.option("--modes", type=int, help="Flux modes of a contact. With --method exact or arc.")
+@click.option("--degree", type=int, help="Polynomial degree on the edges of cells, 1 to 5. With --method cell.")
+@click.option("--bounds", is_flag=True, help="Rigorous bounds too. With --method cell and few disks.")
 @click.option(
-    "--contact-angle", type=float, help="Half-angle in degrees of bonded contacts; without it contacts are overlaps."
+    "--contact-angle", type=float, help="Half-angle of bonded contacts [degrees]. Without it contacts are overlaps."
 )
-@click.option("--bond-gap", type=float, default=BOND_GAP, show_default=True, help="Largest bonded gap, in mean radii.")
 @click.option(
-    "--conductivity", type=float, help="Conductivity of the particles [W/(m K)]; 1 by default, or the file's column."
+    "--bond-gap", type=float, default=BOND_GAP, show_default=True, help="Largest gap of a contact, in mean radii."
+)
+@click.option(
+    "--conductivity",
+    type=float,
+    help="Conductivity of the particles [W/(m K)]. By default the column of the file, or 1.",
 )
 @click.option(
     "--pore-conductivity",
@@ -61,14 +72,14 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
     type=float,
     default=0.0,
     show_default=True,
-    help="Resistance of every contact, walls included, in 2D per unit thickness [K/W, m K/W].",
+    help="Resistance of every contact, walls included [K/W, in 2D m K/W].",
 )
 @contact_options
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with particles, contacts and fields.")
 @click.option("--vtk", type=click.Path(path_type=Path), help="VTK PolyData (.vtp) for ParaView.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the temperature field.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@click.option("--full", is_flag=True, help="With --json, the temperature of every contact too.")
+@click.option("--full", is_flag=True, help="The temperature of every contact too. With --json.")
 def solve_command(
     particles: Path,
     words: SampleWords,
@@ -82,10 +93,11 @@ def solve_command(
 ) -> None:
     """Effective conductivity of the particles in a file.
 
-    PARTICLES is a CSV file with the columns x,y[,z],radius[,conductivity], a LAMMPS/LIGGGHTS text dump, a netCDF (.nc)
-    or VTK (.vtp) file as ``pack`` writes it, or a file of another DEM code (VTK, extended XYZ, YADE, MercuryDPM); -
-    is standard input. Along the load axis the walls are held at 1 (low end) and 0 (far end), unless the box is
-    periodic along it.
+    PARTICLES is one of: CSV with the columns x,y[,z],radius[,conductivity]. A LAMMPS or LIGGGHTS text dump. A netCDF
+    (.nc) or VTK (.vtp) file of etc-engine pack. VTK, extended XYZ, YADE or MercuryDPM of another DEM code. The word -
+    is standard input.
+
+    Along the load axis one wall is held at the temperature 1 and the other at 0, unless the box is periodic.
     """
     start = time.perf_counter()
     import numpy as np

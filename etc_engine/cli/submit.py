@@ -22,7 +22,7 @@ EXIT_RESUMABLE = 75
 def submit_command(
     study: Path, server: str, token_file: Path | None, waiting: bool, output: Path | None, as_json: bool
 ) -> int:
-    """Hand in STUDY (a TOML file); prints its identity alone on stdout, all else on stderr.
+    """Hand in STUDY (a TOML file). Its identity alone goes to stdout, all else to stderr.
 
     The same study again is answered from the result that is there. With --wait the exit status is that of `sweep`: 0
     done, 4 done with failed realizations, 75 ended without a result.

@@ -40,16 +40,17 @@ class PartType(click.ParamType):
 @click.command("sweep")
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="netCDF file to write.")
-@click.option("--resume", is_flag=True, help="Go on where an earlier run stopped; starts anew if there is none.")
+@click.option("--resume", is_flag=True, help="Continue an earlier run. Start anew where there is none.")
 @click.option("--overwrite", is_flag=True, help="Start anew and replace what is there.")
-@click.option("--dry-run", is_flag=True, help="Print units, time and memory, and what is there; write nothing.")
-@click.option("--part", type=PartType(), help="Compute part K of N only; --resume without --part joins all parts.")
+@click.option("--dry-run", is_flag=True, help="Print units, time, memory and what is there. Write nothing.")
+@click.option("--part", type=PartType(), help="Compute part K of N only. --resume without --part joins all parts.")
 def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_run: bool, part: Part | None) -> int:
     """Run all realizations of STUDY (a TOML file) and write one dataset.
 
-    Under mpirun every rank computes; the result has the same bits for any number of ranks. Finished units
-    are kept beside the output until it is complete. Exit status: 0 done, 2 refused, 4 done with failed
-    realizations, 75 stopped early, to be continued by --resume.
+    Under mpirun every rank computes. The result has the same bits for any number of ranks. Finished units are kept
+    beside the output until it is complete.
+
+    Exit status: 0 done, 2 refused, 4 done with failed realizations, 75 stopped early (continue with --resume).
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")

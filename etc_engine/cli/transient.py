@@ -37,7 +37,7 @@ class Wanted:
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "output", required=True, type=click.Path(path_type=Path), help="netCDF file to write.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing output file, or states of one.")
-@click.option("--resume", is_flag=True, help="Go on from the last written state (kind network).")
+@click.option("--resume", is_flag=True, help="Continue from the last written state (kind network).")
 @click.option("--plot", type=click.Path(path_type=Path), help="Panel picture (kind network).")
 @click.option("--vtk", type=click.Path(path_type=Path), help="VTK series (.pvd) for ParaView (kind network).")
 def transient_command(

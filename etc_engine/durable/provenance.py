@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 LIBRARIES = ("numpy", "scipy", "pyamg", "numba", "xarray", "netCDF4", "mpi4py")
 
@@ -73,23 +74,45 @@ def _version(name: str) -> str:
 
 
 def engine_commit(environment: Mapping[str, str] = os.environ) -> str:
-    """Commit of the engine: of its own repository, or what it was installed from; else "unknown"."""
+    """Commit of the engine: of its own repository, or of what it was installed from; else "unknown".
+
+    An installation from a local clone has the commit of the clone, as long as its source is that of the clone.
+    """
     home = Path(__file__).resolve().parents[2]
     if (home / ".git").exists():
-        try:
-            done = subprocess.run(
-                ["git", "-C", str(home), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"],
-                capture_output=True,
-                text=True,
-                check=True,
-                timeout=20,
-                env={**environment, "GIT_OPTIONAL_LOCKS": "0"},
-            )
-        except (OSError, subprocess.SubprocessError):
-            return "unknown"
-        return done.stdout.strip()
+        return _described(home, environment)
     try:
         origin = json.loads(distribution("etc-engine").read_text("direct_url.json") or "{}")
-    except (PackageNotFoundError, ValueError):
+        commit = origin.get("vcs_info", {}).get("commit_id")
+        address = urlsplit(origin.get("url", ""))
+    except (PackageNotFoundError, ValueError, AttributeError):
         return "unknown"
-    return str(origin.get("vcs_info", {}).get("commit_id", "unknown"))
+    clone = Path(unquote(address.path))
+    if commit is None and address.scheme == "file" and (clone / ".git").exists():
+        same = _same_source(home / "etc_engine", clone / "etc_engine")
+        return _described(clone, environment) if same else f"unknown ({clone} has changed since it was installed)"
+    return str(commit or "unknown")
+
+
+def _same_source(installed: Path, clone: Path) -> bool:
+    """Whether both folders hold the same Python files."""
+    files = sorted(path.relative_to(installed) for path in installed.rglob("*.py"))
+    if files != sorted(path.relative_to(clone) for path in clone.rglob("*.py")):
+        return False
+    return all((installed / path).read_bytes() == (clone / path).read_bytes() for path in files)
+
+
+def _described(clone: Path, environment: Mapping[str, str]) -> str:
+    """Commit of a clone, with -dirty where it has changes; else "unknown"."""
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(clone), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=20,
+            env={**environment, "GIT_OPTIONAL_LOCKS": "0"},
+        )
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return done.stdout.strip()

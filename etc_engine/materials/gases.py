@@ -332,6 +332,7 @@ def _coolprop() -> Any:
         import CoolProp.CoolProp as properties
     except ImportError:
         raise InputError(
-            "gases by name need CoolProp: pip install 'etc-engine[gas]', or give [pores] conductivity as a number"
+            "gases by name need CoolProp: install it with pip install '.[gas]' in the folder of etc_engine, or give "
+            "[pores] conductivity as a number"
         ) from None
     return properties

@@ -215,7 +215,7 @@ def write_vtk_series(path: Path, series: xarray.Dataset) -> None:
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
     except ImportError:
         raise InputError(
-            "writing VTK files needs the library vtk: install the extra with pip install 'etc-engine[vtk]'"
+            "writing VTK files needs the library vtk: install it with pip install '.[vtk]' in the folder of etc_engine"
         ) from None
     to_vtk: Any = numpy_support.numpy_to_vtk
     count, spheres = series.sizes["particle"], "z" in series

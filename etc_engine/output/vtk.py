@@ -40,7 +40,7 @@ def write_vtp(path: Path, field: ParticleField) -> None:
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
     except ImportError:
         raise InputError(
-            "writing VTK files needs the library vtk: install the extra with pip install 'etc-engine[vtk]'"
+            "writing VTK files needs the library vtk: install it with pip install '.[vtk]' in the folder of etc_engine"
         ) from None
     if field.medium.dimension == 3:
         write_sphere_vtp(path, field)

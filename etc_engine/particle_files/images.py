@@ -121,7 +121,9 @@ def _numpy(path: Path) -> NDArray[np.generic]:
 
 def _tiff(path: Path) -> NDArray[np.generic]:
     if find_spec("tifffile") is None:
-        raise InputError("TIFF needs the library tifffile: install the extra with pip install 'etc-engine[images]'")
+        raise InputError(
+            "TIFF needs the library tifffile: install it with pip install '.[images]' in the folder of etc_engine"
+        )
     trouble = apart.why_unreadable(path, apart.TIFF)
     if trouble:
         raise InputError(f"{path} cannot be read as TIFF: {trouble}")

@@ -103,7 +103,8 @@ def _raw(path: Path) -> Iterator[BinaryIO]:
 def _zstandard(raw: BinaryIO) -> Iterator[BinaryIO]:
     if find_spec("zstandard") is None:
         raise InputError(
-            "files in Zstandard (.zst) need the library zstandard: install the extra with pip install 'etc-engine[zst]'"
+            "files in Zstandard (.zst) need the library zstandard: install it with pip install '.[zst]' in the folder "
+            "of etc_engine"
         )
     zstandard = import_module("zstandard")
     try:

@@ -173,7 +173,9 @@ def require_vtk() -> None:
     InputError
     """
     if find_spec("vtkmodules") is None:
-        raise InputError("VTK files need the library vtk: install the extra with pip install 'etc-engine[vtk]'")
+        raise InputError(
+            "VTK files need the library vtk: install it with pip install '.[vtk]' in the folder of etc_engine"
+        )
 
 
 def _library() -> tuple[Any, Any, Any, Any]:

@@ -166,3 +166,40 @@ def _with_output(output, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "etc_engine", *arguments], stdout=output, stderr=subprocess.PIPE, text=True, check=False
     )
+
+
+def test_the_bare_command_shows_its_help():
+    done = etc_engine()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == etc_engine("--help").stdout
+    assert "..." not in done.stdout.split("Commands:")[1]  # no sentence is cut
+    assert "_ETC_ENGINE_COMPLETE=bash_source" in done.stdout
+
+
+@pytest.mark.parametrize(("shell", "word"), [("bash", "complete -o nosort"), ("zsh", "compdef"), ("fish", "complete")])
+def test_completion_is_there(shell, word):
+    assert word in etc_engine(_ETC_ENGINE_COMPLETE=f"{shell}_source").stdout
+
+
+def test_help_lists_every_word_of_engines_methods_and_rules():
+    from etc_engine.medium.rules import RULES
+    from etc_engine.realization.engines import ENGINES
+
+    shown = {name: " ".join(etc_engine(name, "--help").stdout.split()) for name in ("solve", "homogenize")}
+    for engine in ENGINES.values():
+        text = shown["solve" if engine.needs_contacts else "homogenize"]
+        assert f"{engine.name}: " in text
+        options = text[text.index("--method ") :]
+        for word in engine.methods:
+            assert word in options, f"{engine.name} {word}"
+    for word in RULES:
+        assert word in shown["solve"]
+
+
+def test_no_help_text_joins_two_ideas_by_a_semicolon():
+    table = cli.CommandTable()
+    for name in table.list_commands(click.Context(table)):
+        command = table.get_command(click.Context(table), name)
+        texts = [command.help, *(option.help for option in command.params if isinstance(option, click.Option))]
+        joined = [text for text in texts if text and "; " in text]
+        assert joined == []

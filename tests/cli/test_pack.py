@@ -77,7 +77,8 @@ def test_the_file_reads_back_to_the_last_bit(pack, tmp_path):
         ((*SMALL, "--periodic", "x"), "periodic"),
         ((*SMALL, "--count", 0), "at least one particle, found count 0"),
         ((*SMALL, "--density", "nan"), "positive and finite"),
-        ((*SMALL, "--contact-gap", -1), "--contact-gap"),
+        ((*SMALL, "--bond-gap", -1), "--bond-gap"),
+        ((*SMALL, "--contact-gap", 1e-4), "--contact-gap 0.0001 is now --bond-gap 0.0001"),
         (("--radii", "equal:0.01", "--box", "1,1,1"), "the advancing front fills 2D boxes with walls"),
         ((*LS_2D, "--count", 500, "--density", 0.95), "disks fill at most 0.9069"),
         ((*LS_3D, "--count", 500, "--density", 0.75), "spheres fill at most 0.7405"),
@@ -221,7 +222,7 @@ def test_vtk_files_without_vtk_are_refused_before_the_work(pack, tmp_path, monke
     monkeypatch.setattr(vtp, "find_spec", lambda _: None)
     done = pack(*SMALL, "-o", tmp_path / "a.vtp")
     assert done.returncode == 2
-    assert "install the extra with pip install 'etc-engine[vtk]'" in done.stderr
+    assert "install it with pip install '.[vtk]'" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 

@@ -52,7 +52,7 @@ def test_without_the_extra_it_says_what_to_install(refused, tmp_path, monkeypatc
     for name in [name for name in sys.modules if name.startswith("etc_engine.service")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "fastapi", None)
-    refused("the service needs fastapi: install the extra with pip install 'etc-engine[service]'", "--data", tmp_path)
+    refused("the service needs fastapi: install it with pip install '.[service]'", "--data", tmp_path)
 
 
 def test_a_port_in_use(tmp_path, refused):

@@ -36,7 +36,7 @@ TANGENT = np.radians(0.01)
 """Contacts of a smaller half-angle are points."""
 
 
-def save_structure(packing: ParticlePacking, path: Path | str, contact_gap: float = 1e-6) -> None:
+def save_structure(packing: ParticlePacking, path: Path | str, bond_gap: float = 1e-6) -> None:
     """Write a picture of a packing and its structure.
 
     Parameters
@@ -44,7 +44,7 @@ def save_structure(packing: ParticlePacking, path: Path | str, contact_gap: floa
     packing : ParticlePacking
     path : path
         File ending in png, pdf, svg or jpg.
-    contact_gap : float
+    bond_gap : float
         Particles closer than this part of their mean radius are in contact.
 
     Raises
@@ -52,10 +52,10 @@ def save_structure(packing: ParticlePacking, path: Path | str, contact_gap: floa
     OutputError
         If the file cannot be written, or its ending is none of these.
     """
-    save(draw_structure(packing, contact_gap), path)
+    save(draw_structure(packing, bond_gap), path)
 
 
-def draw_structure(packing: ParticlePacking, contact_gap: float = 1e-6) -> Figure:
+def draw_structure(packing: ParticlePacking, bond_gap: float = 1e-6) -> Figure:
     """Figure of a packing, with its structure on the right.
 
     Coordination numbers, half-angles of overlapping contacts, contact directions, pair correlation, two-point
@@ -65,7 +65,7 @@ def draw_structure(packing: ParticlePacking, contact_gap: float = 1e-6) -> Figur
     figure = new_figure(16.0, 6.6)
     left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[1.0, 1.55]))
     draw_particles(left.add_subplot(), packing)
-    contacts = neighbor_pairs(packing, relative_gap=contact_gap)
+    contacts = neighbor_pairs(packing, relative_gap=bond_gap)
     solid = solid_fraction(packing)
     _draw_coordination(right.add_subplot(2, 3, 1), packing, contacts)
     _draw_half_angles(right.add_subplot(2, 3, 2), packing)
