@@ -294,7 +294,8 @@ async def study_report(request: Request, study: Id) -> FileResponse:
 async def solve(
     request: Request,
     box: Annotated[
-        str | None, Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, for CSV", examples=["1,1"])
+        str | None,
+        Query(pattern="^[0-9eE+.,-]{1,99}$", description="edge lengths, for files without", examples=["1,1"]),
     ] = None,
     periodic: Annotated[str | None, Query(pattern="^[xyz]{0,3}$")] = None,
     frame: Annotated[int | None, Query(ge=-(10**9), le=10**9)] = None,
@@ -306,7 +307,7 @@ async def solve(
     conductivity: Annotated[Finite, Query(description="of the particles [W/(m K)]")] = None,
     contact_resistance: Annotated[Finite, Query(description="of a contact [m K/W]")] = None,
 ) -> Solved:
-    """Effective conductivity of the particles in the body; the options are those of ``etc-engine solve``."""
+    """Effective conductivity of the particles in the body; formats and options are those of ``etc-engine solve``."""
     given = {
         "box": box,
         "periodic": periodic,
@@ -320,9 +321,12 @@ async def solve(
         "contact-resistance": contact_resistance,
     }
     options = [f"--{name}={value}" for name, value in given.items() if value is not None]
-    particles = await request.body()
-    answer = await run_in_threadpool(_service(request).runner.solve, particles, options)
-    return Solved.model_validate(answer)
+    runner = _service(request).runner
+    with runner.upload() as particles:
+        with particles.open("wb") as file:
+            async for block in request.stream():
+                await run_in_threadpool(file.write, block)
+        return Solved.model_validate(await run_in_threadpool(runner.solve, particles, options))
 
 
 @api.get("/models")

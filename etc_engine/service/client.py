@@ -159,7 +159,7 @@ def fetch(server: Server, study: str, output: Path | None = None) -> xarray.Data
 
 
 def download(server: Server, study: str, output: Path, part: str = "result.nc") -> None:
-    """Write the result (or ``report.html``) of a study to a file, whole or not at all."""
+    """Write the result (or ``report.html``) of a study to a file, whole and undamaged or not at all."""
     with (
         replacing(output) as draft,
         _open(server, "GET", f"/api/studies/{_identity(study)}/{part}") as reply,
@@ -170,10 +170,23 @@ def download(server: Server, study: str, output: Path, part: str = "result.nc") 
             file.write(block)
         if expected not in (-1, file.tell()):
             raise OutputError(f"{server.url} broke off after {file.tell()} of {expected} bytes: try again")
+        file.flush()
+        if part == "result.nc":
+            _verify(draft, output)
+
+
+def _verify(draft: Path, output: Path) -> None:
+    """Refuse a result that was damaged on its way, or before."""
+    from etc_engine.sweep.result_file import open_dataset
+
+    try:
+        open_dataset(draft)
+    except OutputError as error:
+        raise OutputError(str(error).replace(str(draft), f"{output} as it came")) from None
 
 
 def solve(server: Server, particles: bytes, **options: Any) -> dict[str, Any]:
-    """Conductivity of the particles in a CSV file or a dump, given as its bytes.
+    """Conductivity of the particles in a file of any format that is read, given as its bytes.
 
     The options are those of ``etc-engine solve``, with underscores: ``box="1,1"``, ``contact_angle=5.0``, ...
     """

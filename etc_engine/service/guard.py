@@ -3,20 +3,22 @@
 * The Host header has to be one of this service (a page that rebinds its own name to this machine has another).
 * A request that changes something has to come from this service's own page, or from no page at all (no forgery).
 * Where there is a token, everything but the page itself needs it, in the header Authorization and nowhere else.
-* A body may not be longer than its limit, whatever its header says.
+* A body may not be longer than its limit, whatever its header says, and has to come in time.
 """
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import json
+import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
 from starlette.exceptions import HTTPException
 
 from etc_engine.service.addresses import LOOPBACK, is_address
-from etc_engine.service.settings import Settings
+from etc_engine.service.settings import Limits, Settings
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -26,6 +28,8 @@ App = Callable[[Message, Receive, Send], Awaitable[None]]
 CHANGING = ("POST", "PUT", "PATCH", "DELETE")
 OPEN = ("/", "/page/app.js", "/page/figure.js", "/page/style.css", "/page/icon.svg")
 """The page without any data."""
+CLOSING = {"connection": "close"}
+"""Header of a refusal that leaves a body unread."""
 UPLOADS = ("/api/solve",)
 HEADERS = {
     b"x-content-type-options": b"nosniff",
@@ -74,7 +78,7 @@ class Guard:
                 message["headers"] = [*message["headers"], *(h for h in HEADERS.items() if h[0] not in present)]
             await send(message)
 
-        await self._app(scope, _limited(receive, limit), guarded_send)
+        await self._app(scope, _limited(receive, limit, self._settings.limits), guarded_send)
 
     def _refusal(self, method: str, path: str, headers: dict[str, str]) -> tuple[int, str] | None:
         host = headers.get("host", "")
@@ -131,15 +135,24 @@ def host_name(header: str) -> str:
     return header.partition(":")[0].lower()
 
 
-def _limited(receive: Receive, limit: int) -> Receive:
-    seen = 0
+def _limited(receive: Receive, longest: int, limits: Limits) -> Receive:
+    """Bytes of a body up to its limit, and in time."""
+    began, seen, complete = time.monotonic(), 0, False
 
     async def guarded() -> Message:
-        nonlocal seen
-        message = await receive()
+        nonlocal seen, complete
+        if complete:  # whoever asks now waits for the client to go away
+            return await receive()
+        left = began + limits.body_seconds + seen / limits.body_rate - time.monotonic()
+        try:
+            message = await asyncio.wait_for(receive(), max(left, 0.0))
+        except TimeoutError:
+            reason = f"the body comes too slowly: {limits.body_rate:g} bytes/s are expected here"
+            raise HTTPException(408, reason, CLOSING) from None
         seen += len(message.get("body", b""))
-        if seen > limit:
-            raise HTTPException(413, _too_long(limit))
+        complete = not message.get("more_body", False)
+        if seen > longest:
+            raise HTTPException(413, _too_long(longest), CLOSING)
         return message
 
     return guarded

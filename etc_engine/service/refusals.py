@@ -8,6 +8,7 @@ import json
 import logging
 import sqlite3
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -17,6 +18,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from etc_engine.errors import EtcError, InputError, StudyError
+from etc_engine.particle_files.formats import FORMATS
 from etc_engine.service.admission import field_of, toml_of
 from etc_engine.service.client import IDENTITY
 from etc_engine.service.held import EngineError
@@ -40,7 +42,7 @@ PARTICLES_EXAMPLE = "x,y,radius\n0.25,0.5,0.26\n0.75,0.5,0.26\n"
 PARTICLES_BODY = {
     "requestBody": {
         "required": True,
-        "description": "a CSV file with the columns x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS text dump",
+        "description": f"{', '.join(kind.name for kind in FORMATS)}; text may be compressed by gzip or Zstandard",
         "content": {
             "text/csv": {"schema": {"type": "string"}, "example": PARTICLES_EXAMPLE},
             "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
@@ -54,10 +56,11 @@ REFUSALS: dict[int | str, dict[str, Any]] = {
     403: {"model": Problem, "description": "from a page of another site"},
     404: {"model": Problem, "description": "there is no such study, model or file"},
     409: {"model": Problem, "description": "not in this state"},
+    408: {"model": Problem, "description": "too slow"},
     413: {"model": Problem, "description": "too long"},
     422: {"model": Problem, "description": "refused, in the words of the command line"},
     429: {"model": Problem, "description": "too many requests of this kind are waiting"},
-    503: {"model": Problem, "description": "another program holds the queue"},
+    503: {"model": Problem, "description": "another program holds the queue, or out of file descriptors"},
 }
 
 
@@ -121,8 +124,8 @@ async def refuse_repeated_keys(request: Request) -> None:
         return
 
 
-def _problem(status: int, error: str, field: str = "") -> JSONResponse:
-    return JSONResponse({"error": " ".join(error.split()), "field": field}, status)
+def _problem(status: int, error: str, field: str = "", headers: Mapping[str, str] | None = None) -> JSONResponse:
+    return JSONResponse({"error": " ".join(error.split()), "field": field}, status, headers)
 
 
 def _refuse_input(request: Request, error: Exception) -> Response:
@@ -148,7 +151,7 @@ def _refuse_request(request: Request, error: Exception) -> Response:
         reason = f"there is nothing at {request.url.path[:200]}"
     if error.status_code == 400:
         reason = f"the body cannot be read as JSON; {EXPECTED}"
-    return _problem(error.status_code, reason)
+    return _problem(error.status_code, reason, headers=error.headers)
 
 
 def _refuse_parameter(_request: Request, error: Exception) -> Response:
@@ -173,5 +176,8 @@ def _report_failure(_request: Request, error: Exception) -> Response:
         return _problem(507, "the disk of the service is full: nothing was changed, try again when there is room")
     if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
         return _problem(503, "another program holds the queue of the service: nothing was changed, try again later")
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        log.error("%s: requests are refused until some are closed; see ulimit -n", error.strerror)
+        return _problem(503, "the service is out of file descriptors: nothing was changed, try again later")
     log.error("unexpected %s: %s", type(error).__name__, error, exc_info=error)
     return _problem(500, f"unexpected {type(error).__name__} in the service, see its log")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from etc_engine.errors import InputError
-from etc_engine.particle_files.formats import CSV, DUMP, format_to_read
 from etc_engine.service.held import Held, run_held
 from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
@@ -40,25 +40,39 @@ class Runner:
         self._slots = threading.Semaphore(solves)
         self._waiting = threading.BoundedSemaphore(5 * solves)
 
-    def solve(self, particles: bytes, options: Sequence[str]) -> dict[str, Any]:
-        """What ``etc-engine solve --json`` says of uploaded particles, with its warnings.
+    @contextmanager
+    def upload(self) -> Iterator[Path]:
+        """A place for the particles of a single solve, counted before any of them has come.
+
+        Yields
+        ------
+        Path
+            Of the file to write, in a folder of its own that is removed in the end.
 
         Raises
         ------
-        InputError
-            If the particles are refused, take too long or too much memory, or too many requests wait.
+        BusyError
+            If too many requests upload, wait or are solved.
         """
         if not self._waiting.acquire(blocking=False):
             raise BusyError("too many single solves are waiting: try again in a minute")
         try:
-            with self._slots, tempfile.TemporaryDirectory(dir=self.store.scratch) as folder:
-                (Path(folder) / UPLOAD).write_bytes(particles)
-                if format_to_read(Path(folder) / UPLOAD) not in (CSV, DUMP):
-                    raise InputError("upload: expected a CSV file or a LAMMPS/LIGGGHTS text dump, found another format")
-                line = ["solve", UPLOAD, "--json", "--full", *options]
-                printed, said = self._run(line, Path(folder), self.settings.limits.solve_seconds)
+            with tempfile.TemporaryDirectory(dir=self.store.scratch) as folder:
+                yield Path(folder) / UPLOAD
         finally:
             self._waiting.release()
+
+    def solve(self, particles: Path, options: Sequence[str]) -> dict[str, Any]:
+        """What ``etc-engine solve --json`` says of an uploaded file, with its warnings.
+
+        Raises
+        ------
+        InputError
+            If the particles are refused, or take too long or too much memory.
+        """
+        with self._slots:
+            line = ["solve", UPLOAD, "--json", "--full", *options]
+            printed, said = self._run(line, particles.parent, self.settings.limits.solve_seconds)
         warnings = [text.removeprefix("etc-engine: ") for text in said.splitlines() if text.strip()]
         return {**json.loads(printed), "warnings": warnings}
 

@@ -7,6 +7,8 @@ import logging
 import signal
 import socket
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from types import FrameType
 
 import uvicorn
@@ -14,6 +16,7 @@ import uvicorn
 from etc_engine.errors import InputError, OutputError
 from etc_engine.service.addresses import is_loopback
 from etc_engine.service.app import Service, make_app
+from etc_engine.service.connections import Connection, Seldom, Server, most_connections
 from etc_engine.service.launchers import check_launcher, make_launcher
 from etc_engine.service.live import LiveResults
 from etc_engine.service.queue import Queue
@@ -23,7 +26,6 @@ from etc_engine.service.store import open_store
 from etc_engine.service.supervisor import Supervisor
 
 BACKLOG = 256
-CONNECTIONS = 1000
 
 
 def serve(settings: Settings, ready: Callable[[str], None]) -> None:
@@ -47,6 +49,9 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
     import xarray  # noqa: F401 - loaded now, so that the first figure does not wait for it
 
     logging.basicConfig(format="etc-engine: %(message)s", level=logging.WARNING)
+    for handler in logging.getLogger().handlers:
+        handler.addFilter(Seldom())
+    limits = replace(settings.limits, connections=most_connections(settings.limits))
     listener = _listen(settings)
     with listener, open_store(settings.data) as store:
         queue = Queue(store.database, settings.limits.waiting)
@@ -60,7 +65,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
             server_header=False,
             lifespan="off",
             timeout_graceful_shutdown=5,
-            limit_concurrency=CONNECTIONS,
+            http=partial(Connection, limits),  # type: ignore[arg-type]
             forwarded_allow_ips="",
         )
         # the server gives signals on to the handlers it found: these let the batches end in order
@@ -69,7 +74,7 @@ def serve(settings: Settings, ready: Callable[[str], None]) -> None:
         supervisor.start()
         try:
             ready(address(listener))
-            uvicorn.Server(config).run(sockets=[listener])
+            Server(config).run(sockets=[listener])
         finally:
             supervisor.stop()
             queue.close()

@@ -31,7 +31,13 @@ class Limits:
     waiting : int
         Largest number of studies in the queue.
     solves : int
-        Single solves at the same time; as many again and again four times may wait.
+        Single solves at the same time; four times as many may wait, uploads under way included.
+    connections, client_connections : int
+        Connections at the same time, and those of one address.
+    idle_seconds : float
+        Longest time that a connection may wait with no request, or with the beginning of one.
+    body_seconds, body_rate : float
+        Time for a body to come: so long, and the time of its bytes at this rate [bytes/s].
     """
 
     study_bytes: int = 64 * 1024
@@ -44,6 +50,11 @@ class Limits:
     solve_seconds: float = 120.0
     waiting: int = 10_000
     solves: int = 1
+    connections: int = 1000
+    client_connections: int = 200
+    idle_seconds: float = 20.0
+    body_seconds: float = 20.0
+    body_rate: float = 16 * 1024
 
 
 @dataclass(frozen=True)

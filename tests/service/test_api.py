@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 from serving import STUDY, Service, ask, renamed, until
 
+from etc_engine.box import Box
 from etc_engine.comparison import simulated
 from etc_engine.errors import InputError, OutputError
+from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.formats import FORMATS, write_particles
+from etc_engine.particle_files.table import ParticleTable
 from etc_engine.service import client
 from etc_engine.sweep.dataset import differing_variables
 from etc_engine.sweep.result_file import open_dataset
@@ -148,6 +154,45 @@ def test_a_dump_brings_its_box(service):
     assert found["conductivity"] == client.solve(service.server, PARTICLES, box="1,1")["conductivity"]
 
 
+SPHERES = ((0.25, 0.5, 0.5, 0.26), (0.75, 0.5, 0.5, 0.26))
+
+
+def as_bytes(kind: str, folder: Path) -> bytes:
+    """Two spheres in a unit cube, in one of the formats."""
+    rows = ["{:g} {:g} {:g} {:g}".format(*sphere) for sphere in SPHERES]
+    if kind == "YADE text file":
+        return ("#format x_y_z_r\n" + "\n".join(rows) + "\n").encode()
+    if kind == "XYZ file":
+        head = '2\nLattice="1 0 0 0 1 0 0 0 1" pbc="F F F" Properties=pos:R:3:radius:R:1\n'
+        return (head + "\n".join(rows) + "\n").encode()
+    if kind == "MercuryDPM data file":
+        lines = ["{:g} {:g} {:g} 0 0 0 {:g} 0 0 0 0 0 0 0".format(*sphere) for sphere in SPHERES]
+        return ("2 0 0 0 0 1 1 1\n" + "\n".join(lines) + "\n").encode()
+    if kind == "VTK file (legacy)":
+        points = "\n".join("{:g} {:g} {:g}".format(*sphere[:3]) for sphere in SPHERES)
+        head = f"# vtk DataFile Version 3.0\nspheres\nASCII\nDATASET POLYDATA\nPOINTS 2 double\n{points}\n"
+        return f"{head}POINT_DATA 2\nSCALARS radius double 1\nLOOKUP_TABLE default\n0.26\n0.26\n".encode()
+    ending = next(row.endings[0] for row in FORMATS if row.name == kind)
+    packing = ParticlePacking([one[:3] for one in SPHERES], [one[3] for one in SPHERES], Box((1.0, 1.0, 1.0)))
+    write_particles(folder / f"spheres{ending}", ParticleTable(packing))
+    return (folder / f"spheres{ending}").read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
+def test_every_format_that_is_read_is_solved(service, tmp_path, kind):
+    if "VTK" in kind.name:
+        pytest.importorskip("vtkmodules", reason="the extra vtk is not installed")
+    particles = as_bytes(kind.name, tmp_path)
+    box = {} if kind.brings_box else {"box": "1,1,1"}
+    found = client.solve(service.server, particles, **box)
+    assert found["particles"] == 2
+    expected = b"x,y,z,radius\n0.25,0.5,0.5,0.26\n0.75,0.5,0.5,0.26\n"
+    assert found["conductivity"] == client.solve(service.server, expected, box="1,1,1")["conductivity"]
+    if kind.name == "dump":
+        assert client.solve(service.server, gzip.compress(particles))["conductivity"] == found["conductivity"]
+
+
 @pytest.mark.parametrize(
     ("particles", "options", "words"),
     [
@@ -155,7 +200,7 @@ def test_a_dump_brings_its_box(service):
         (PARTICLES, {"box": "1,1", "method": "magic"}, "magic"),
         (b"x,y\n1,2\n", {"box": "1,1"}, "upload has neither a radius nor a diameter column"),
         (b"x,y,radius\n0.5,0.5,much\n", {"box": "1,1"}, "upload, line 2: radius is not a number: 'much'"),
-        (b"\x89HDF\r\n\x1a\n", {}, "another format"),
+        (b"\x89HDF\r\n\x1a\n", {}, "upload cannot be read as netCDF: it is damaged"),
         (b"", {"box": "1,1"}, "header"),
         (PARTICLES, {"box": "1,1", "contact_angle": "nan"}, "finite"),
         (PARTICLES, {"box": "; rm -rf"}, "box"),

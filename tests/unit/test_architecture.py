@@ -37,7 +37,7 @@ KEEPERS = {
     "CoolProp": {"materials/gases.py"},
     "fastapi": {"service"},
     "starlette": {"service"},
-    "uvicorn": {"service/server.py"},
+    "uvicorn": {"service/server.py", "service/connections.py"},
 }
 
 

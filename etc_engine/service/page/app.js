@@ -309,8 +309,8 @@ function solve() {
   const input = (id, placeholder, hint, label) => field(id, label, h("input", { id, name: id, placeholder, autocomplete: "off" }), hint);
   const answer = h("div", { "aria-live": "polite" }), button = h("button", { class: "main" }, "Solve");
   const form = h("form", { novalidate: true }, h("fieldset", {}, h("legend", {}, "Particles"), h("div", { class: "fields" },
-    field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity], or a LAMMPS/LIGGGHTS dump"),
-    input("box", "1,1", "edge lengths, for CSV; a dump brings its own", "Box"), input("periodic", "", "such as xy, for CSV", "Periodic axes"),
+    field("file", "File", h("input", { id: "file", type: "file", required: true }), "CSV with x,y,radius[,conductivity]; LAMMPS/LIGGGHTS dump, netCDF, VTK, extended XYZ, YADE or MercuryDPM"),
+    input("box", "1,1", "edge lengths, for CSV, YADE and legacy VTK; others bring their own", "Box"), input("periodic", "", "such as xy, for files without a box", "Periodic axes"),
     field("engine", "Engine", h("select", { id: "engine", name: "engine" }, Object.keys(about.engines).map(word => h("option", {}, word))), ""),
     field("method", "Method", h("select", { id: "method", name: "method" }), ""),
     input("contact_angle", "", "degrees; empty: overlaps", "Contact half-angle"), input("conductivity", "", "of the particles [W/(m K)]", "Conductivity"))),
