@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from etc_engine.cli.contact_options import ContactWords, contact_options
+from etc_engine.cli.distributed import distributed_option
 from etc_engine.cli.particle_options import (
     SampleWords,
     particle_options,
@@ -17,14 +18,12 @@ from etc_engine.cli.particle_options import (
 )
 from etc_engine.cli.physics_options import physics_options
 from etc_engine.cli.solve_notes import trim_cropped_walls, warn_of_missing_contacts
-from etc_engine.cli.solve_outputs import SolveOutputs, write_outputs
+from etc_engine.cli.solve_outputs import SolveOutputs, print_table, write_outputs
 from etc_engine.cli.solve_request import BOND_GAP, SolveRequest, load_axes
 
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.medium import Medium
-
-LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fill_height": "fill height [m]"}
 
 
 @click.command("solve")
@@ -80,6 +79,7 @@ LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fi
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the temperature field.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.option("--full", is_flag=True, help="The temperature of every contact too. With --json.")
+@distributed_option
 def solve_command(
     particles: Path,
     words: SampleWords,
@@ -115,7 +115,7 @@ def solve_command(
     table = read_sample(particles, words)
     elastic = asked.physics.youngs_modulus, asked.physics.poisson_ratio
     medium = asked.medium(table, particles, dumped.network(table, words.frame, *elastic))
-    axes = load_axes(asked.axis, medium)
+    axes = load_axes(asked.axis, medium.box)
     medium = trim_cropped_walls(medium, table, axes)
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
@@ -148,7 +148,7 @@ def solve_command(
     if as_json:
         print_json(record)
     else:
-        _print_table(record)
+        print_table(record)
 
 
 def _record(
@@ -192,20 +192,3 @@ def _record(
         "iterations": result.iterations,
         "relative_energy_error": result.relative_energy_error,
     }
-
-
-def _print_table(record: dict[str, Any]) -> None:
-    for name, value in record.items():
-        if name in ("contact_temperatures", "status"):  # the name of the status is printed
-            continue
-        if name == "conductivity_tensor":
-            text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
-        elif name.endswith("_per_axis"):
-            text = ", ".join(f"{axis} {k:.8g}" for axis, k in value.items())
-        elif name == "conductivity_bounds":
-            text = " to ".join(f"{k:.8g}" for k in value)
-        else:
-            text = f"{value:.8g}" if isinstance(value, float) else str(value)
-        unit = " W/(m K)" if name.startswith("conductivity") else ""
-        label = LABELS.get(name, name.replace("_", " "))
-        click.echo(f"{label:24s}{text}{unit}")

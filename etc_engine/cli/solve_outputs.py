@@ -8,12 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 if TYPE_CHECKING:
     from etc_engine.medium.field import ParticleField
     from etc_engine.particle_files.table import ParticleTable
 
 PER_AXIS = ("conductivity", "conductivity_between_walls")
 """Values of a record that stand in it by axis."""
+
+
+LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fill_height": "fill height [m]"}
 
 
 @dataclass(frozen=True)
@@ -77,3 +82,21 @@ def write_outputs(outputs: SolveOutputs, field: ParticleField, record: dict[str,
                 low, high = record["conductivity_bounds"]
                 caption += f", bounds {low:.8g} to {high:.8g}"
             save_field(files.enter_context(replacing(outputs.plot)), field, caption)
+
+
+def print_table(record: dict[str, Any]) -> None:
+    """Print a record, a line for each value."""
+    for name, value in record.items():
+        if name in ("contact_temperatures", "status"):  # the name of the status is printed
+            continue
+        if name == "conductivity_tensor":
+            text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
+        elif name.endswith("_per_axis"):
+            text = ", ".join(f"{axis} {k:.8g}" for axis, k in value.items())
+        elif name == "conductivity_bounds":
+            text = " to ".join(f"{k:.8g}" for k in value)
+        else:
+            text = f"{value:.8g}" if isinstance(value, float) else str(value)
+        unit = " W/(m K)" if name.startswith("conductivity") else ""
+        label = LABELS.get(name, name.replace("_", " "))
+        click.echo(f"{label:24s}{text}{unit}")

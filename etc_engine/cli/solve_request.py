@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from etc_engine.cli.physics_options import PhysicsWords
 
 if TYPE_CHECKING:
+    from etc_engine.box import Box
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.medium import Medium
     from etc_engine.medium.network import ContactNetwork
@@ -140,12 +141,11 @@ class SolveRequest:
         return self.physics.between_walls(medium, axes)
 
 
-def load_axes(word: str | None, medium: Medium) -> tuple[int, ...]:
+def load_axes(word: str | None, box: Box) -> tuple[int, ...]:
     """Axes of a word; without one x, and the other axes too that come at no price in a periodic box."""
     from etc_engine.box import AXES
     from etc_engine.errors import InputError
 
-    box = medium.box
     if word == "all" or (word is None and all(box.periodic)):
         return tuple(range(box.dimension))
     word = "x" if word is None else word

@@ -78,7 +78,7 @@ def find_backbone(
     driven = driven_walls(network, axes)
     if walls_conduct is not None:
         driven &= walls_conduct
-    clusters, winding = _clusters(n, network.pairs[conducts], network.shifts[conducts])
+    clusters, winding = join_clusters(n, network.pairs[conducts], network.shifts[conducts])
     if box.periodic[axes[0]]:
         spanning = winding[:, list(axes)]
     else:
@@ -89,7 +89,7 @@ def find_backbone(
     in_play = np.zeros(n, dtype=np.bool_)
     for column in spanning.T:
         in_play |= column[clusters]
-    kept = _prune(in_play, network.pairs[conducts], network.wall_particles[driven])
+    kept = prune_dead_ends(in_play, network.pairs[conducts], network.wall_particles[driven])
     contacts = conducts & kept[network.pairs[:, 0]] & kept[network.pairs[:, 1]]
     wall_contacts = driven & kept[network.wall_particles]
     return Backbone(contacts, wall_contacts, clusters, spans)
@@ -138,7 +138,7 @@ def joined_axes(
     (0,)
     """
     n, box = packing.count, packing.box
-    clusters, winding = _clusters(n, pairs, shifts)
+    clusters, winding = join_clusters(n, pairs, shifts)
     touches = np.zeros((n, 2 * box.dimension), dtype=np.bool_)
     touches[clusters[wall_particles], walls] = True
     spanning = np.where(box.periodic, winding, touches[:, 0::2] & touches[:, 1::2])
@@ -161,7 +161,7 @@ def _root(parent: NDArray[np.int64], offset: NDArray[np.int64], i: int, displace
 
 
 @njit(cache=True)
-def _clusters(
+def join_clusters(
     n: int, pairs: NDArray[np.int64], shifts: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Cluster label (lowest row) of each particle, and the axes around which each labelled cluster wraps."""
@@ -197,7 +197,7 @@ def _clusters(
 
 
 @njit(cache=True)
-def _prune(
+def prune_dead_ends(
     in_play: NDArray[np.bool_], pairs: NDArray[np.int64], wall_particles: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Particles in play that keep at least two contacts when dead ends are taken away repeatedly."""

@@ -135,7 +135,16 @@ def check_conductors(medium: Medium) -> None:
     ------
     InputError
     """
-    values = medium.conductivity
+    check_conductivities(medium.conductivity)
+
+
+def check_conductivities(values: Floats) -> None:
+    """Refuse conductivities of particles as `check_conductors` does.
+
+    Raises
+    ------
+    InputError
+    """
     bad = ~((values >= 1.0 / LARGEST) & (values <= LARGEST))
     if bad.any():
         found = float(values[bad][0])

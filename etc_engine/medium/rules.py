@@ -207,6 +207,8 @@ class Rule:
     optional : tuple of str
         Keys that may be left out.
     dimensions : tuple of int
+    local : bool
+        Whether a contact depends on its two particles alone, no farther apart than overlap or ``bond_gap`` says.
     radii_may_grow : bool
         Whether packers may let particles overlap to reach a density: the rule takes its contacts from overlaps.
     """
@@ -216,6 +218,7 @@ class Rule:
     optional: tuple[str, ...] = ()
     dimensions: tuple[int, ...] = (2, 3)
     radii_may_grow: bool = False
+    local: bool = False
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -228,9 +231,9 @@ ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", *WALL)}
 """Elastic constants of the particles and of the walls, as a study and as a rule spells them."""
 
 RULES: Mapping[str, Rule] = {
-    "overlap": Rule(overlap_contacts, {}, radii_may_grow=True),
-    "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}),
-    "radius": Rule(radius_contacts, {"contact_radius": "contact_radius", "bond_gap": "bond_gap"}),
+    "overlap": Rule(overlap_contacts, {}, radii_may_grow=True, local=True),
+    "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}, local=True),
+    "radius": Rule(radius_contacts, {"contact_radius": "contact_radius", "bond_gap": "bond_gap"}, local=True),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
     "hertz": Rule(
         hertz_contacts,

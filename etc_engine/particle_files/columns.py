@@ -206,10 +206,10 @@ class ColumnReader:
 
     def column(self, name: str) -> Floats | None:
         """The numbers of one column so far; None if the file has no such column."""
-        if name not in self.numeric or not self._batches:
+        if name not in self.numeric:
             return None
         place = list(self.numeric).index(name)
-        return np.concatenate([batch[:, place] for batch in self._batches])
+        return np.concatenate([np.zeros(0), *(batch[:, place] for batch in self._batches)])
 
     def positions(self) -> Floats:
         """Positions as they are printed, shape (n, 2) or (n, 3)."""

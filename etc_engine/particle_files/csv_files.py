@@ -10,7 +10,7 @@ from typing import TextIO
 
 from etc_engine.box import AXES, Box
 from etc_engine.errors import InputError
-from etc_engine.particle_files.columns import ColumnReader, batches, find_layout
+from etc_engine.particle_files.columns import ColumnReader, Layout, batches, find_layout
 from etc_engine.particle_files.digits import PrintedColumn, PrintedColumns
 from etc_engine.particle_files.sample import Rows, Sample, make_table
 from etc_engine.particle_files.streams import BOM, open_stream
@@ -68,11 +68,11 @@ def csv_rows(path: Path | str, radius_column: str | None = None) -> Rows:
     """
     path = Path(path)
     with open_stream(path) as stream:
-        lines = _content(path, stream)
+        lines = content_lines(path, stream)
         number, header = next(lines, (0, ""))
         if not header:
             raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
-        names, separator = _header(path, number, header)
+        names, separator = table_header(path, number, header)
         return table_rows(path, names, separator, lines, radius_column)
 
 
@@ -95,14 +95,36 @@ def table_rows(
     ------
     InputError
     """
+    rows = part_of_table(path, table_layout(path, names, radius_column), separator, lines)
+    if not rows.radii.size:
+        raise InputError(f"{path} holds no particles, only a header")
+    return rows
+
+
+def table_layout(path: Path, names: Sequence[str], radius_column: str | None) -> Layout:
+    """Where the wanted columns of a table stand.
+
+    Raises
+    ------
+    InputError
+        If one is missing, or positions are parts of a box that the file does not hold.
+    """
     layout = find_layout(str(path), names, radius_column)
     if any(layout.scaled):
         raise InputError(f"{path} has positions scaled by a box that it does not hold; found {','.join(names)}")
+    return layout
+
+
+def part_of_table(path: Path, layout: Layout, separator: str | None, lines: Iterator[tuple[int, str]]) -> Rows:
+    """Rows of some lines of a table, possibly of none; parameters as of `table_rows`.
+
+    Raises
+    ------
+    InputError
+    """
     reader = ColumnReader(str(path), layout, separator)
     for batch in batches(lines):
         reader.feed(_unquoted([text for _, text in batch], separator), [number for number, _ in batch])
-    if not reader.rows:
-        raise InputError(f"{path} holds no particles, only a header")
     radii, digits = reader.column("radius"), reader.digits()
     assert radii is not None
     half = 0.5 if layout.halved else 1.0
@@ -150,7 +172,7 @@ def numbered_lines(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, s
     yield from enumerate(_lines(path, stream), 1)
 
 
-def _content(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:
+def content_lines(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:
     """Lines with their numbers, without blank ones and comments; a header behind ``#`` is no comment."""
     headed = False
     for number, raw in numbered_lines(path, stream):
@@ -188,7 +210,7 @@ def _names_positions(text: str) -> bool:
     return {"x", "y"} <= words or {"points:0", "points:1"} <= words
 
 
-def _header(path: Path, number: int, header: str) -> tuple[list[str], str | None]:
+def table_header(path: Path, number: int, header: str) -> tuple[list[str], str | None]:
     """Names of the columns, and what separates them."""
     separator = next((mark for mark in SEPARATORS if mark in header), None)
     names = [name.strip().strip('"') for name in (header.split(separator) if separator else header.split())]

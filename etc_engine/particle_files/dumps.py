@@ -13,7 +13,7 @@ from etc_engine.box import AXES
 from etc_engine.errors import InputError
 from etc_engine.particle_files.columns import BATCH, ColumnReader, batches, find_layout
 from etc_engine.particle_files.digits import PrintedColumn, PrintedColumns
-from etc_engine.particle_files.items import Frame, find_frames, table_lines
+from etc_engine.particle_files.items import Block, Frame, find_frames, table_lines
 from etc_engine.particle_files.sample import Rows, Sample, make_table
 from etc_engine.particle_files.streams import open_stream
 from etc_engine.particle_files.table import ParticleTable
@@ -75,11 +75,22 @@ def dump_rows(path: Path, sample: Sample) -> Rows:
     InputError
     """
     frame = -1 if sample.frame is None else sample.frame
-    frames = find_frames(path, frame if frame >= 0 else None)
-    if not -len(frames) <= frame < len(frames):
+    chosen, scale = choose_frame(path, find_frames(path, frame if frame >= 0 else None), frame)
+    return frame_rows(path, chosen, scale, sample.radius_column)
+
+
+def choose_frame(path: Path, frames: list[Frame], number: int) -> tuple[Frame, float]:
+    """The frame of a number, and metres per unit of length of the dump.
+
+    Raises
+    ------
+    InputError
+        If there is no such frame, or the units are unknown.
+    """
+    if not -len(frames) <= number < len(frames):
         held = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
-        raise InputError(f"{path} holds {held}, numbered from 0: there is no frame {frame}")
-    return frame_rows(path, frames[frame], _scale(path, frames), sample.radius_column)
+        raise InputError(f"{path} holds {held}, numbered from 0: there is no frame {number}")
+    return frames[number], _scale(path, frames)
 
 
 def count_frames(path: Path | str) -> int:
@@ -218,20 +229,8 @@ def frame_rows(path: Path, frame: Frame, scale: float = 1.0, radius_column: str 
     InputError
         If the frame is cut short, or its box or table is not understood.
     """
-    place = f"{path}" if frame.number == 0 else f"{path}, frame {frame.number}"
-    block = frame.blocks.get("ATOMS")
-    _step(path, frame)
-    if block is None or "BOX BOUNDS" not in frame.blocks:
-        _refuse_incomplete(path, frame)
-        raise AssertionError  # the call above raises
-    try:
-        count = frame.number_of("NUMBER OF ATOMS")
-    except ValueError:
-        raise InputError(f"{path}: frame {frame.number} is cut short or malformed") from None
-    if count == 0:
-        raise InputError(f"{place} holds no particles")
-    layout = find_layout(place, block.words, radius_column)
-    reader = ColumnReader(place, layout)
+    place, block, count = frame_table(path, frame)
+    reader = ColumnReader(place, find_layout(place, block.words, radius_column))
     with open_stream(path) as stream:
         found = 0
         for lines in batches(table_lines(stream, block)):
@@ -250,7 +249,30 @@ def frame_rows(path: Path, frame: Frame, scale: float = 1.0, radius_column: str 
         raise InputError(
             f"{path}: frame {frame.number} is cut short or malformed: {count} particles are announced, {found} found"
         )
-    return _sorted_rows(place, frame, reader, scale)
+    return sorted_rows(place, frame, reader, scale)
+
+
+def frame_table(path: Path, frame: Frame) -> tuple[str, Block, int]:
+    """Name of a frame for messages, its block of atoms, and how many it announces.
+
+    Raises
+    ------
+    InputError
+        If something is missing, or there are none.
+    """
+    place = f"{path}" if frame.number == 0 else f"{path}, frame {frame.number}"
+    block = frame.blocks.get("ATOMS")
+    _step(path, frame)
+    if block is None or "BOX BOUNDS" not in frame.blocks:
+        _refuse_incomplete(path, frame)
+        raise AssertionError  # the call above raises
+    try:
+        count = frame.number_of("NUMBER OF ATOMS")
+    except ValueError:
+        raise InputError(f"{path}: frame {frame.number} is cut short or malformed") from None
+    if count == 0:
+        raise InputError(f"{place} holds no particles")
+    return place, block, count
 
 
 def _without_blank_end(lines: list[str], most: int) -> list[str]:
@@ -258,7 +280,8 @@ def _without_blank_end(lines: list[str], most: int) -> list[str]:
     return lines[: max(most, 0)] if not "".join(lines[max(most, 0) :]).strip() else lines
 
 
-def _sorted_rows(place: str, frame: Frame, reader: ColumnReader, scale: float) -> Rows:
+def sorted_rows(place: str, frame: Frame, reader: ColumnReader, scale: float) -> Rows:
+    """What a reader found in a frame, sorted by id, in metres; arguments and errors as of `frame_rows`."""
     bounds, periodic = _box(place, frame)
     layout = reader.layout
     radii = reader.column("radius")

@@ -6,7 +6,7 @@ many frames takes the memory of one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -85,15 +85,20 @@ def find_frames(path: Path, wanted: int | None = None) -> list[Frame]:
     InputError
         If the file is no such dump.
     """
-    frames: list[Frame] = []
     with open_stream(path) as stream:
-        for block in _blocks(path, stream):
-            units = block.name in FIRST and bool(frames) and frames[-1].table is not None
-            if not frames or block.name in frames[-1].blocks or units:
-                if wanted is not None and len(frames) > wanted:
-                    return frames
-                frames.append(Frame(len(frames)))
-            frames[-1].blocks[block.name] = block
+        return frames_of(path, _blocks(path, stream), wanted)
+
+
+def frames_of(path: Path, blocks: Iterable[Block], wanted: int | None = None) -> list[Frame]:
+    """Blocks of a dump, in their order, as frames; arguments and errors as of `find_frames`."""
+    frames: list[Frame] = []
+    for block in blocks:
+        units = block.name in FIRST and bool(frames) and frames[-1].table is not None
+        if not frames or block.name in frames[-1].blocks or units:
+            if wanted is not None and len(frames) > wanted:
+                return frames
+            frames.append(Frame(len(frames)))
+        frames[-1].blocks[block.name] = block
     if not frames:
         raise InputError(f"{path} holds no frames")
     if frames[-1].table is None and set(frames[-1].blocks) <= set(FIRST) - {"TIMESTEP"}:
@@ -111,6 +116,33 @@ def table_lines(stream: BinaryIO, block: Block) -> Iterator[str]:
             return
         left -= len(line)
         yield line.decode("utf-8", errors="replace")
+
+
+def blocks_at(path: Path, starts: Iterable[int], end: int) -> Iterator[Block]:
+    """Blocks of an uncompressed dump whose ITEM lines begin at known bytes.
+
+    Parameters
+    ----------
+    path : Path
+    starts : iterable of int
+        In ascending order.
+    end : int
+        Bytes of the file.
+    """
+    begins = list(starts)
+    with open_stream(path) as stream:
+        for begin, after in zip(begins, [*begins[1:], end], strict=True):
+            stream.seek(begin)
+            header = stream.readline()
+            lines = [stream.readline(HEADER) for _ in range(LONGEST)] if b" ATOMS" not in header[:12] else []
+            held: list[bytes] = []
+            first = begin + len(header)
+            for line in lines:
+                if first + sum(map(len, held)) + len(line) > after:
+                    break
+                held.append(line)
+            text = [line.decode("utf-8", errors="replace") for line in held]
+            yield _block(header.decode("utf-8", errors="replace").split(), text, first, after)
 
 
 def _blocks(path: Path, stream: BinaryIO) -> Iterator[Block]:

@@ -83,8 +83,14 @@ def read_netcdf(path: Path | str, sample: Sample | None = None) -> ParticleTable
     return make_table(netcdf_rows(Path(path)), sample or Sample())
 
 
-def netcdf_rows(path: Path) -> Rows:
+def netcdf_rows(path: Path, part: tuple[int, int] = (0, 1)) -> Rows:
     """Rows of a netCDF file.
+
+    Parameters
+    ----------
+    path : Path
+    part : (int, int)
+        Number of the part to read, of how many; all of it by default.
 
     Raises
     ------
@@ -98,8 +104,10 @@ def netcdf_rows(path: Path) -> Rows:
     if trouble:
         raise InputError(f"{path} cannot be read as netCDF: {trouble}")
     try:
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
-            dataset.load()
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as whole:
+            count = whole.sizes.get("particle", 0)
+            first, last = (count * (part[0] + k) // part[1] for k in (0, 1))
+            dataset = (whole.isel(particle=slice(first, last)) if count else whole).load()
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} cannot be read as netCDF: {error}") from None
     box = _box(path, dataset.attrs)

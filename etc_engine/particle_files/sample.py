@@ -118,8 +118,8 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
         row = int(np.flatnonzero(bad)[0])
         found = rows.positions[row].tolist()
         raise InputError(f"{rows.place}: particle {row} has a centre that is not finite: found {found}")
-    dimension, notes = _dimension(rows, sample)
-    bounds, periodic = _faces(rows, sample, dimension)
+    bounds, periodic, notes = sample_box(rows, sample)
+    dimension = len(bounds)
     whole = Box(tuple((bounds[:, 1] - bounds[:, 0]).tolist()), periodic)
     centers = rows.positions[:, :dimension] - bounds[:, 0]
     outside = np.flatnonzero(((centers < 0.0) | (centers > np.asarray(whole.lengths))).any(axis=1))
@@ -146,6 +146,18 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
         notes=(*rows.notes, *notes),
         **{name: None if values is None else values[keep] for name, values in columns.items()},
     )
+
+
+def sample_box(rows: Rows, sample: Sample) -> tuple[Floats, tuple[bool, ...], tuple[str, ...]]:
+    """Faces of the box before a crop, shape (d, 2) [m], its periodic axes, and notes on what decided.
+
+    Raises
+    ------
+    InputError
+        If there is no box, or it does not fit the particles.
+    """
+    dimension, notes = _dimension(rows, sample)
+    return *_faces(rows, sample, dimension), notes
 
 
 def _crop(

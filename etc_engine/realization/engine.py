@@ -76,6 +76,9 @@ class Engine:
         (medium, method=, options) -> section through the heat flux, for a picture.
     remarks : callable
         (method, result) -> what a user should know about the accuracy of a result.
+    distribute : callable, optional
+        (particles, contacts, conduction, ranks, gap=) -> (conductivity, census) of one packing on many ranks, by the
+        methods that heed the option ``distributed``.
     memory : callable
         (edge lengths, particles, options) -> expected bytes of a rank, particles included.
     """
@@ -89,6 +92,7 @@ class Engine:
     recover: Callable[[Medium, str, Any, int], ParticleField] | None = None
     section: Callable[..., Any] | None = None
     remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
+    distribute: Callable[..., tuple[EffectiveConductivity[Any], Any]] | None = None
     memory: Callable[[Sequence[float], float, Mapping[str, Any]], float] = lambda _, n, __: PARTICLE_BYTES * n
 
     @property

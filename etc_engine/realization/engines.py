@@ -9,6 +9,7 @@ import numpy as np
 
 from etc_engine.box import AXES
 from etc_engine.engines.dtem import families as dtem
+from etc_engine.engines.dtem.distributed.conductivity import distributed_conductivity
 from etc_engine.engines.dtem.methods import dimensions_of
 from etc_engine.engines.lattice import homogenize as lattice
 from etc_engine.engines.pipe import steady as pipe
@@ -28,6 +29,7 @@ from etc_engine.realization.options import (
     BOUNDS,
     DEGREE,
     DIPOLES,
+    DISTRIBUTED,
     ERROR_ESTIMATE,
     FRAME,
     GREEN,
@@ -74,7 +76,7 @@ ENGINES: Mapping[str, Engine] = {
             "dtem",
             "discrete thermal elements: particles with resistances between all of their contacts",
             {
-                "chord": _elements("chord", "contact chords, each exact for a far source"),
+                "chord": _elements("chord", "contact chords, each exact for a far source", "distributed"),
                 "standard": _elements("standard", "uniform flux over the contact arcs (Feng et al. 2008)"),
                 "enhanced": _elements("enhanced", "uniform flux with a tabulated correction (Feng et al. 2008)"),
                 "arc": _elements("arc", "flux over the contact arcs in modes", "modes"),
@@ -111,7 +113,9 @@ ENGINES: Mapping[str, Engine] = {
                 "frame": FRAME,
                 "error_estimate": ERROR_ESTIMATE,
                 "bounds": BOUNDS,
+                "distributed": DISTRIBUTED,
             },
+            distribute=distributed_conductivity,
             system=dtem.system_of,
             recover=dtem.field_of,
             remarks=dtem.remarks_on,

@@ -90,3 +90,4 @@ FRAME = Option(
 DEGREE = Option("polynomial degree of the temperature on the edges of the cells of disks", 3, whole_number(1, 5))
 ERROR_ESTIMATE = Option("whether the discretization error is estimated, by finer computations", False, _truth)
 BOUNDS = Option("whether rigorous bounds are computed, by a conforming mesh of few disks", False, _truth)
+DISTRIBUTED = Option("whether all ranks solve each packing together, of packings in files", False, _truth)

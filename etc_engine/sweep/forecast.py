@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from etc_engine.durable.lock import Holder, alive, read_holder
+from etc_engine.durable.provenance import peak_bytes
 from etc_engine.errors import EtcError, PackingError
 from etc_engine.realization import Status
 from etc_engine.study.sweep import Study, read_study
@@ -96,7 +95,7 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
         ranks=ranks,
         first_seconds=max(0.0, first - costly),
         unit_seconds=(costly, cheap),
-        rank_bytes=_peak_bytes(),
+        rank_bytes=peak_bytes(),
         gathered_bytes=JOINING * row_type(study).itemsize * most + dataset_bytes,
         shard_bytes=len(encode(record)) * len(units),
         dataset_bytes=dataset_bytes,
@@ -165,9 +164,3 @@ def _probe(study: Study, place: NDArray[np.int64], realize: Realize) -> tuple[fl
     started = time.perf_counter()
     record = run_unit(study, study.realization_spec(unit.density), unit, 0, realize)
     return time.perf_counter() - started, record
-
-
-def _peak_bytes() -> int:
-    """The most memory this process has held."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak

@@ -10,13 +10,15 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import Any, NoReturn, Protocol, TypeVar, cast
 
 import numpy as np
 
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import EtcError, InputError
+from etc_engine.ranks import Alone, Ranks
 
 T = TypeVar("T")
 
@@ -37,11 +39,8 @@ ABORT_SECONDS = 0.5
 """Time for the launcher to pass on the last words of a rank before it ends all."""
 
 
-class Communicator(Protocol):
+class Communicator(Ranks, Protocol):
     """What a sweep needs of its ranks."""
-
-    rank: int
-    size: int
 
     def broadcast(self, value: Any) -> Any:
         """The value of rank 0, on every rank."""
@@ -62,11 +61,8 @@ class Communicator(Protocol):
         """End all ranks at once: the way out when this rank cannot go on."""
 
 
-class Solo:
+class Solo(Alone):
     """The communicator of a single process, without MPI."""
-
-    rank = 0
-    size = 1
 
     def __init__(self) -> None:
         self._slots = [0, 0, 0, 0]
@@ -131,6 +127,25 @@ class World:
         """The values of all ranks on rank 0, None elsewhere."""
         answer: list[Any] | None = self._comm.gather(value, root=0)
         return answer
+
+    def share(self, value: Any) -> list[Any]:
+        """The values of all ranks, on every rank."""
+        every: list[Any] = self._comm.allgather(value)
+        return every
+
+    def exchange(self, values: Sequence[Any]) -> list[Any]:
+        """One value from each rank, for one value to each rank."""
+        others = [None if rank == self.rank else value for rank, value in enumerate(values)]
+        received: list[Any] = self._comm.alltoall(others)
+        received[self.rank] = values[self.rank]  # not copied
+        return received
+
+    def add_up(self, values: Floats | Ints) -> Any:
+        """Sum of an array over the ranks, on every rank."""
+        own = np.ascontiguousarray(values)
+        total = np.empty_like(own)
+        self._comm.Allreduce(own, total, op=self._mpi.SUM)
+        return total
 
     def wait_for_all(self, meanwhile: Callable[[], None]) -> None:
         """A barrier that sleeps: a spinning rank would take the core of one that still works."""

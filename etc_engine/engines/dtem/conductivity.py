@@ -14,6 +14,7 @@ from etc_engine.engines.dtem.exact.bounds import energy_bounds
 from etc_engine.engines.dtem.exact.spheres import DEGREE
 from etc_engine.engines.dtem.model_error import chord_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution, solve_steady
+from etc_engine.errors import InputError
 from etc_engine.medium.backbone import Backbone, find_backbones
 from etc_engine.medium.conduction import Conduction, Result, attempt
 from etc_engine.medium.conductivity import EffectiveConductivity, conductivities, effective_tensor
@@ -224,7 +225,14 @@ def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result
     Media that differ in nothing but one half-angle of all contacts are solved together by a reduced basis if there are
     at least `CURVE_ANGLES` of them, unless the option ``angle_curve`` is ``full``; what that cannot solve is solved
     alone, which says why. Method ``exact`` needs every solution for its bounds.
+
+    Raises
+    ------
+    InputError
+        If a packing is to be solved on many ranks, and is here already as a whole.
     """
+    if conduction.options.get("distributed"):
+        raise InputError("distributed is for packings in files: etc-engine solve --distributed, or a sweep over files")
     backbones: dict[int, Backbones] = {}
     for medium in media:
         key = id(medium.links.pairs)

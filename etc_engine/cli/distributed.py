@@ -1,0 +1,165 @@
+"""``etc-engine solve --distributed``: one packing on all ranks that a launcher started."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from etc_engine.errors import EtcError, InputError
+
+if TYPE_CHECKING:
+    from etc_engine.cli.contact_options import ContactWords
+    from etc_engine.cli.particle_options import SampleWords
+    from etc_engine.cli.solve_request import SolveRequest
+    from etc_engine.medium.network import ContactNetwork
+    from etc_engine.packing.particles import ParticlePacking
+    from etc_engine.sweep.scheduler import Communicator
+
+HELP = (
+    "All ranks of mpirun solve one packing together, each a part of it; needs petsc4py. Takes a dump, CSV or netCDF, "
+    "method chord, and the rules overlap, bonded and radius; writes no files."
+)
+
+
+def distributed_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give ``solve`` the option ``--distributed``, with which all ranks do its work."""
+
+    @wraps(command)
+    def chosen(distributed: bool, **given: Any) -> Any:
+        return _on_ranks(**given) if distributed else command(**given)
+
+    return click.option("--distributed", is_flag=True, help=HELP)(chosen)
+
+
+def _on_ranks(**given: Any) -> int:
+    """Run on all ranks; an error is reported once, and one that not all ranks know of ends them all."""
+    from etc_engine.sweep.scheduler import connect
+
+    communicator = connect()
+    try:
+        status = _solve(communicator, **given)
+    except EtcError:
+        if communicator.rank == 0:
+            raise
+        return 2  # every rank has the same error, one reports it
+    except BaseException as error:
+        if communicator.size == 1:
+            raise
+        click.echo(f"etc-engine: unexpected {type(error).__name__} on rank {communicator.rank}: {error}", err=True)
+        communicator.abort(1)
+    communicator.close()
+    return status
+
+
+def _solve(
+    ranks: Communicator,
+    particles: Path,
+    words: SampleWords,
+    dumped: ContactWords,
+    as_json: bool,
+    full: bool,
+    output: Path | None,
+    vtk: Path | None,
+    plot: Path | None,
+    **given: Any,
+) -> int:
+    from etc_engine.cli.options import print_json
+    from etc_engine.cli.solve_outputs import print_table
+    from etc_engine.cli.solve_request import SolveRequest
+    from etc_engine.realization.distributed import check_local, read_scattered
+
+    start = time.perf_counter()
+    asked = SolveRequest(**given)
+    asked.refuse_old_words()
+    unheeded = {"-o": output, "--vtk": vtk, "--plot": plot, "--full": full, "--contacts": dumped.contacts}
+    _refuse_unheeded({**unheeded, "--types": words.types, "--crop": words.crop}, asked)
+    check_local(asked.rule)
+    file = read_scattered(particles, words.sample(), ranks)
+    if asked.conductivity is not None and file.conductivity is not None:
+        raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
+    solid = asked.physics.solid() if asked.conductivity is None else asked.conductivity
+    if solid is None and file.conductivity is None:
+        solid = 1.0
+    if ranks.rank == 0:
+        for note in file.notes:
+            click.echo(f"etc-engine: note: {note}", err=True)
+    record = _record(ranks, asked, file, None if file.conductivity is not None else solid)
+    record["seconds"] = time.perf_counter() - start
+    if ranks.rank == 0:
+        (print_json if as_json else print_table)(record)
+    return 0
+
+
+def _refuse_unheeded(given: dict[str, Any], asked: SolveRequest) -> None:
+    """Refuse options that mean nothing here."""
+    physics = asked.physics
+    for name in ("gas", "emissivity", "roughness", "wall_temperatures"):
+        given[f"--{name.replace('_', '-')}"] = getattr(physics, name)
+    given |= {"--pore-conductivity": asked.pore_conductivity, "--modes": asked.modes, "--degree": asked.degree}
+    found = [name for name, value in {**given, "--bounds": asked.bounds}.items() if value]
+    if found:
+        raise InputError(f"{found[0]} is not taken with --distributed: leave it out, or solve on one rank")
+
+
+def _record(ranks: Communicator, asked: SolveRequest, file: Any, conductivity: float | None) -> dict[str, Any]:
+    """What the ranks found, with the keys of ``solve`` on one rank."""
+    from math import radians
+
+    from etc_engine.box import AXES
+    from etc_engine.cli.solve_request import load_axes
+    from etc_engine.durable.provenance import peak_bytes
+    from etc_engine.medium.conduction import Conduction
+    from etc_engine.medium.sample_warnings import excess_warnings
+    from etc_engine.realization import Status
+    from etc_engine.realization.distributed import solve_scattered
+
+    half_angle = None if asked.contact_angle is None else radians(asked.contact_angle)
+
+    def contacts(packing: ParticlePacking) -> ContactNetwork:
+        network = asked.physics.network(packing, half_angle, asked.bond_gap)
+        return network.with_resistance(asked.contact_resistance)
+
+    axes = load_axes(asked.axis, file.box)
+    method = asked.method or "chord"
+    conduction = Conduction(asked.engine, method, {"distributed": True}, axes=axes)
+    gap = asked.bond_gap if asked.takes_gap else 0.0
+    result, census = solve_scattered(file, conductivity, contacts, conduction, ranks, gap=gap)
+    peaks = ranks.share(peak_bytes())
+    axis = axes[0]
+    if ranks.rank == 0:
+        for message in excess_warnings(result.tensor, census.most_conductive):
+            click.echo(f"etc-engine: warning: {message}", err=True)
+    percolates = bool(result.spans[axis])
+    status = Status.OK if percolates else Status.NOT_PERCOLATING
+    record: dict[str, Any] = {
+        "engine": asked.engine,
+        "method": method,
+        "conductivity": float(result.tensor[axis, axis]),
+        "conductivity_per_axis": {AXES[a]: float(result.tensor[a, a]) for a in axes},
+    }
+    if all(file.box.periodic):
+        record["conductivity_tensor"] = result.tensor
+    return record | {
+        "particles": census.particles,
+        "density": census.density,
+        "fill_height": census.fill_height,
+        "pore_conductivity": 0.0,
+        "contact_rule": asked.rule,
+        **asked.physics.record,
+        "contacts": census.contacts,
+        "links": census.contacts,
+        "wall_contacts": int(census.wall_contacts[axis]),
+        "unknowns": result.unknowns,
+        "percolates": percolates,
+        "status": int(status),
+        "status_name": status.name.lower(),
+        "iterations": result.iterations,
+        "relative_energy_error": result.relative_energy_error,
+        "ranks": ranks.size,
+        "largest_rank_megabytes": max(peaks) / 1e6,
+    }
