@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +17,14 @@ if TYPE_CHECKING:
     from etc_engine.cli.contact_options import ContactWords
     from etc_engine.cli.particle_options import SampleWords
     from etc_engine.cli.solve_request import SolveRequest
+    from etc_engine.medium.conduction import Conduction
     from etc_engine.medium.network import ContactNetwork
     from etc_engine.packing.particles import ParticlePacking
+    from etc_engine.realization.distributed import ScatteredFile
     from etc_engine.sweep.scheduler import Communicator
 
+PATIENCE = 30.0
+"""Seconds that a rank with an error waits for the others to have it too."""
 HELP = (
     "All ranks of mpirun solve one packing together, each a part of it; needs petsc4py. Takes a dump, CSV or netCDF, "
     "method chord, and the rules overlap, bonded and radius; writes no files."
@@ -43,7 +48,9 @@ def _on_ranks(**given: Any) -> int:
     communicator = connect()
     try:
         status = _solve(communicator, **given)
-    except EtcError:
+    except EtcError as error:
+        _meet(communicator, error)
+        communicator.close()
         if communicator.rank == 0:
             raise
         return 2  # every rank has the same error, one reports it
@@ -54,6 +61,18 @@ def _on_ranks(**given: Any) -> int:
         communicator.abort(1)
     communicator.close()
     return status
+
+
+def _meet(communicator: Communicator, error: EtcError) -> None:
+    """Wait for the ranks that have the same error; one that others do not know of ends them all."""
+    began = time.monotonic()
+
+    def impatient() -> None:
+        if time.monotonic() - began > PATIENCE:
+            click.echo(f"etc-engine: {error} (rank {communicator.rank} alone)", err=True)
+            communicator.abort(2)
+
+    communicator.wait_for_all(impatient)
 
 
 def _solve(
@@ -71,14 +90,16 @@ def _solve(
     from etc_engine.cli.options import print_json
     from etc_engine.cli.solve_outputs import print_table
     from etc_engine.cli.solve_request import SolveRequest
-    from etc_engine.realization.distributed import check_local, read_scattered
+    from etc_engine.medium.conduction import Conduction
+    from etc_engine.realization.distributed import check_distributed, read_scattered
 
     start = time.perf_counter()
     asked = SolveRequest(**given)
     asked.refuse_old_words()
     unheeded = {"-o": output, "--vtk": vtk, "--plot": plot, "--full": full, "--contacts": dumped.contacts}
     _refuse_unheeded({**unheeded, "--types": words.types, "--crop": words.crop}, asked)
-    check_local(asked.rule)
+    conduction = Conduction(asked.engine, asked.method or "chord", {"distributed": True})
+    check_distributed(conduction, asked.rule, ranks)
     file = read_scattered(particles, words.sample(), ranks)
     if asked.conductivity is not None and file.conductivity is not None:
         raise InputError(f"{particles} has a conductivity column: leave --conductivity out, or take the column out")
@@ -88,7 +109,7 @@ def _solve(
     if ranks.rank == 0:
         for note in file.notes:
             click.echo(f"etc-engine: note: {note}", err=True)
-    record = _record(ranks, asked, file, None if file.conductivity is not None else solid)
+    record = _record(ranks, asked, conduction, file, None if file.conductivity is not None else solid)
     record["seconds"] = time.perf_counter() - start
     if ranks.rank == 0:
         (print_json if as_json else print_table)(record)
@@ -106,14 +127,15 @@ def _refuse_unheeded(given: dict[str, Any], asked: SolveRequest) -> None:
         raise InputError(f"{found[0]} is not taken with --distributed: leave it out, or solve on one rank")
 
 
-def _record(ranks: Communicator, asked: SolveRequest, file: Any, conductivity: float | None) -> dict[str, Any]:
+def _record(
+    ranks: Communicator, asked: SolveRequest, conduction: Conduction, file: ScatteredFile, conductivity: float | None
+) -> dict[str, Any]:
     """What the ranks found, with the keys of ``solve`` on one rank."""
     from math import radians
 
     from etc_engine.box import AXES
     from etc_engine.cli.solve_request import load_axes
     from etc_engine.durable.provenance import peak_bytes
-    from etc_engine.medium.conduction import Conduction
     from etc_engine.medium.sample_warnings import excess_warnings
     from etc_engine.realization import Status
     from etc_engine.realization.distributed import solve_scattered
@@ -125,10 +147,8 @@ def _record(ranks: Communicator, asked: SolveRequest, file: Any, conductivity: f
         return network.with_resistance(asked.contact_resistance)
 
     axes = load_axes(asked.axis, file.box)
-    method = asked.method or "chord"
-    conduction = Conduction(asked.engine, method, {"distributed": True}, axes=axes)
     gap = asked.bond_gap if asked.takes_gap else 0.0
-    result, census = solve_scattered(file, conductivity, contacts, conduction, ranks, gap=gap)
+    result, census = solve_scattered(file, conductivity, contacts, replace(conduction, axes=axes), ranks, gap=gap)
     peaks = ranks.share(peak_bytes())
     axis = axes[0]
     if ranks.rank == 0:
@@ -138,7 +158,7 @@ def _record(ranks: Communicator, asked: SolveRequest, file: Any, conductivity: f
     status = Status.OK if percolates else Status.NOT_PERCOLATING
     record: dict[str, Any] = {
         "engine": asked.engine,
-        "method": method,
+        "method": conduction.method,
         "conductivity": float(result.tensor[axis, axis]),
         "conductivity_per_axis": {AXES[a]: float(result.tensor[a, a]) for a in axes},
     }

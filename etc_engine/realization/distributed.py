@@ -22,6 +22,7 @@ from etc_engine.particle_files.parts import extremes, read_part
 from etc_engine.particle_files.sample import Sample, sample_box
 from etc_engine.ranks import Ranks, together
 from etc_engine.realization.engines import find_engine
+from etc_engine.solvers.petsc import load_petsc
 
 Contacts = Callable[[ParticlePacking], ContactNetwork]
 
@@ -75,16 +76,28 @@ def read_scattered(path: Path, sample: Sample, ranks: Ranks) -> ScatteredFile:
     return ScatteredFile(box, centers, rows.radii, rows.conductivity, (*rows.notes, *notes))
 
 
-def check_local(word: str) -> None:
-    """Refuse a contact rule in which a contact depends on more than its two particles.
+def check_distributed(conduction: Conduction, rule: str, ranks: Ranks) -> None:
+    """Refuse, before anything is read, what many ranks do not solve together.
+
+    Parameters
+    ----------
+    conduction : Conduction
+        Its option ``distributed`` is true.
+    rule : str
+        Word of the contact rule; a contact may depend on its two particles alone.
+    ranks : Ranks
+        Every rank makes this call.
 
     Raises
     ------
     InputError
+        On every rank, also where PETSc is missing.
     """
-    if not find_rule(word).local:
-        able = ", ".join(name for name, rule in RULES.items() if rule.local)
-        raise InputError(f"the contact rule {word} needs the whole packing: on many ranks use {able}")
+    find_engine(conduction.engine).resolve(conduction.method, conduction.options)
+    if not find_rule(rule).local:
+        able = ", ".join(name for name, row in RULES.items() if row.local)
+        raise InputError(f"the contact rule {rule} needs the whole packing: on many ranks use {able}")
+    load_petsc(ranks)
 
 
 def solve_scattered(
@@ -117,7 +130,6 @@ def solve_scattered(
     """
     engine = find_engine(conduction.engine)
     dimension = file.box.dimension
-    engine.resolve(conduction.method, conduction.options)
     if dimension not in engine.find_method(conduction.method).dimensions or engine.distribute is None:
         raise InputError(f"method {conduction.method} of engine {engine.name} does not work in {dimension}D on ranks")
     given = file.conductivity if conductivity is None else np.full(file.radii.size, conductivity)
