@@ -83,14 +83,33 @@ def read_netcdf(path: Path | str, sample: Sample | None = None) -> ParticleTable
     return make_table(netcdf_rows(Path(path)), sample or Sample())
 
 
-def netcdf_rows(path: Path, part: tuple[int, int] = (0, 1)) -> Rows:
+def netcdf_rows(path: Path) -> Rows:
     """Rows of a netCDF file.
 
-    Parameters
-    ----------
-    path : Path
-    part : (int, int)
-        Number of the part to read, of how many; all of it by default.
+    Raises
+    ------
+    InputError
+    """
+    check_netcdf(path)
+    return netcdf_part(path, 0, 1)
+
+
+def check_netcdf(path: Path) -> None:
+    """Refuse a file that the library cannot read to its end.
+
+    Raises
+    ------
+    InputError
+    """
+    if not path.exists():
+        raise InputError(f"there is no file {path}")
+    trouble = why_unreadable(path, NETCDF)
+    if trouble:
+        raise InputError(f"{path} cannot be read as netCDF: {trouble}")
+
+
+def netcdf_part(path: Path, part: int, parts: int) -> Rows:
+    """Rows of one of several equal parts of a netCDF file that can be read.
 
     Raises
     ------
@@ -98,15 +117,10 @@ def netcdf_rows(path: Path, part: tuple[int, int] = (0, 1)) -> Rows:
     """
     import xarray
 
-    if not path.exists():
-        raise InputError(f"there is no file {path}")
-    trouble = why_unreadable(path, NETCDF)
-    if trouble:
-        raise InputError(f"{path} cannot be read as netCDF: {trouble}")
     try:
         with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as whole:
             count = whole.sizes.get("particle", 0)
-            first, last = (count * (part[0] + k) // part[1] for k in (0, 1))
+            first, last = (count * (part + k) // parts for k in (0, 1))
             dataset = (whole.isel(particle=slice(first, last)) if count else whole).load()
     except (OSError, ValueError, RuntimeError) as error:
         raise InputError(f"{path} cannot be read as netCDF: {error}") from None

@@ -17,7 +17,7 @@ from etc_engine.particle_files.csv_files import content_lines, part_of_table, ta
 from etc_engine.particle_files.dumps import choose_frame, frame_table, sorted_rows
 from etc_engine.particle_files.formats import CSV, DUMP, NETCDF, format_to_read
 from etc_engine.particle_files.items import Frame, blocks_at, frames_of
-from etc_engine.particle_files.netcdf import netcdf_rows
+from etc_engine.particle_files.netcdf import check_netcdf, netcdf_part
 from etc_engine.particle_files.sample import Rows, Sample
 from etc_engine.particle_files.streams import GZIP, ZSTANDARD
 from etc_engine.ranks import Ranks, together
@@ -132,7 +132,8 @@ def _csv_part(path: Path, sample: Sample, ranks: Ranks) -> Rows:
 
 def _netcdf_part(path: Path, _: Sample, ranks: Ranks) -> Rows:
     """Part of a netCDF file."""
-    rows = together(ranks, lambda: netcdf_rows(path, (ranks.rank, ranks.size)))
+    together(ranks, lambda: check_netcdf(path) if ranks.rank == 0 else None)
+    rows = together(ranks, lambda: netcdf_part(path, ranks.rank, ranks.size))
     return replace(rows, ids=None, types=None)
 
 
