@@ -130,7 +130,7 @@ def _unbound(rule: str, *, gas: bool, glow: bool) -> str:
 
 
 MANY = 6
-"""More values than this are told by their lowest and highest."""
+"""More values than this are printed as their lowest and highest."""
 
 
 def in_words(values: Any) -> str:

@@ -192,7 +192,7 @@ def seconds_since_touched(path: Path) -> float | None:
 
 
 def boot_identity() -> str:
-    """Identity of this boot of the machine, where the system tells it."""
+    """Identity of this boot of the machine, where the system knows it."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
     except OSError:

@@ -14,7 +14,7 @@ W_MK = "W/(m K)"
 
 @dataclass(frozen=True)
 class Solid:
-    """What is known of a solid.
+    """Properties of a solid and their sources.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def contact_conductances(medium: Medium, law: str = "chord") -> tuple[Floats, Fl
     contacts : ndarray, shape (m,) [W/K, in 2D W/(m K)]
         Heat flow per kelvin between the mean temperatures of two particles.
     walls : ndarray, shape (w,)
-        Likewise between a wall and a particle.
+        Of each contact between a wall and a particle.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Contact rules from load: widths by Hertz, from overlaps, from a mean-field pressure, from forces or areas of a run.
 
 Spheres touch in a disk of radius c, disks in a strip of half-width c; sin alpha_i = c/R_i on either side. Walls may
-have elastic constants of their own; without them they are as the particles.
+have separate elastic constants; without them those of the particles are used.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def hertz_contacts(
 
     Notes
     -----
-    Overlaps below 1e-10 of the mean radius are taken for touching points, which conduct nothing.
+    Overlaps below 1e-10 of the mean radius count as touching points, which conduct nothing.
 
     Examples
     --------
@@ -262,7 +262,7 @@ def with_roughness(
     Parameters
     ----------
     network : ContactNetwork
-        Of a rule from load: its widths tell the pressures.
+        Of a rule from load: the pressures follow from its widths.
     roughness : Roughness
     stiffness : Stiffness
     conductivity : ndarray, shape (n,) [W/(m K)]

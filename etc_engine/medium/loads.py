@@ -38,7 +38,7 @@ class Links(Protocol):
 def load_groups(box: Box) -> tuple[tuple[int, ...], ...]:
     """Load axes that share a matrix: each walled axis alone, all periodic axes together.
 
-    Beside a walled axis a periodic one has a system of its own too, because the walls drive only their axis.
+    Next to a walled axis a periodic axis has a separate system, because the walls drive only their axis.
 
     Examples
     --------

@@ -112,7 +112,7 @@ class ContactNetwork:
         Raises
         ------
         InputError
-            If a resistance is negative or not finite, or there are not as many as contacts.
+            If a resistance is negative or not finite, or there is not one per contact.
         """
         values = _resistances(resistance, self.count + self.walls.size)
         return replace(self, resistances=values[: self.count], wall_resistances=values[self.count :])

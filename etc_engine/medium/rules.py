@@ -25,7 +25,7 @@ from etc_engine.packing.particles import ParticlePacking
 def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
     """Contacts of overlapping particles and of particles that reach over a wall; geometry sets the arcs.
 
-    cos alpha_i = (d^2 + R_i^2 - R_j^2)/(2 d R_i), likewise for j; at a wall cos alpha = distance/R.
+    cos alpha_i = (d^2 + R_i^2 - R_j^2)/(2 d R_i), and with i and j exchanged; at a wall cos alpha = distance/R.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def overlap_contacts(packing: ParticlePacking) -> ContactNetwork:
 
     Notes
     -----
-    Overlaps below 1e-10 of the mean radius are taken for touching points, which conduct nothing.
+    Overlaps below 1e-10 of the mean radius count as touching points, which conduct nothing.
 
     References
     ----------
@@ -162,7 +162,7 @@ def radius_contacts(packing: ParticlePacking, contact_radius: float, bond_gap: f
 
 
 def coordination_contacts(packing: ParticlePacking, half_angle: float, coordination: float) -> ContactNetwork:
-    """Bonded contacts of the closest pairs, as many as give a mean coordination number.
+    """Bonded contacts of the closest pairs, up to a mean coordination number.
 
     The bond gap is the relative gap of the (Z n / 2)-th closest pair.
 

@@ -73,7 +73,7 @@ def refuse_swallowed(packing: ParticlePacking, pairs: Ints, gaps: Floats) -> Non
 
 
 def closest_neighbors(packing: ParticlePacking, coordination: float) -> Neighbors:
-    """The closest pairs, as many as give a mean coordination number, as in `coordination_contacts`."""
+    """The closest pairs up to a mean coordination number, as in `coordination_contacts`."""
     wanted = round(0.5 * coordination * packing.count) if np.isfinite(coordination) else 0
     if wanted < 1:
         raise InputError(f"the mean coordination number must be positive (at least one contact), found {coordination}")

@@ -86,7 +86,7 @@ class ParticleSystem:
         Raises
         ------
         InputError
-            If they are not finite or not as many as the particles.
+            If they are not finite, or not one per particle.
         """
         centers = self.medium.packing.centers
         given = temperatures(centers) if callable(temperatures) else temperatures

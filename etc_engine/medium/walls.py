@@ -195,7 +195,7 @@ class Convective:
 
 @dataclass(frozen=True)
 class Insulated:
-    """A wall that lets no heat pass; its contacts carry none, and it has no temperature of its own."""
+    """A wall that no heat crosses. It has no temperature."""
 
 
 WallCondition = FixedTemperature | HeatFlux | Convective | Insulated

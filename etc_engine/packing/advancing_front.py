@@ -135,7 +135,7 @@ def pack_given_disks(sizes: Floats, spare: RadiusDistribution, box: Box, rng: np
 
 
 def enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) -> Floats:
-    """More radii than the box can hold: their full areas (volumes) exceed its own."""
+    """More radii than the box can hold: their full areas (volumes) exceed its area (volume)."""
     d = box.dimension
     block = int(1.1 * box.volume / radii.mean_measure(d)) + 10
     sizes = radii.sample(block, rng)

@@ -28,7 +28,7 @@ MOST_PARTICLES = 1e9
 
 @dataclass(frozen=True)
 class PackingSpec:
-    """What a packing is to be like.
+    """Specification of a packing.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class PackingSpec:
     growth_rate : float, optional
         Growth rate of the event-driven packer.
     radius_growth : bool
-        Whether the advancing front may exceed its own density by letting the radii grow into overlap.
+        Whether the radii may grow into overlap where the density asked for exceeds that of the advancing front.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Bring a packing to a requested density: vacancies below its own density, radius growth above."""
+"""Bring a packing to a requested density: vacancies below the density of the packing, radius growth above."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ class ParticlePacking:
 
 
 def particle_values(values: ArrayLike, count: int, name: str) -> Floats:
-    """One value for all particles, or one for each, as an array of its own of shape (count,).
+    """One value for all particles, or one for each, as a new array of shape (count,).
 
     Raises
     ------

@@ -47,7 +47,7 @@ class RadiusDistribution:
 
     Notes
     -----
-    Use :func:`parse_radii` to make one from text; it refuses senseless numbers.
+    Use :func:`parse_radii` to make one from text; it refuses invalid numbers.
 
     Examples
     --------

@@ -42,7 +42,7 @@ NAMED = {
     "delta": (("delta",), ("overlap",)),
     "pos": (("x1", "y1", "z1", "x2", "y2", "z2"),),
 }
-"""Names of columns by which a dump may tell them itself."""
+"""Column names by which a dump may name them."""
 FAR = 1e6
 """Box lengths beyond which no image of a particle is looked for."""
 PLACED = 1e-3

@@ -122,7 +122,7 @@ def read_trajectory(path: Path | str, timestep: float = 1.0, sample: Sample | No
 
     Notes
     -----
-    A box that moves or deforms is refused: its walls would do work that no heat balance here knows of.
+    A box that moves or deforms is refused: the heat balance does not include the work of its walls.
     """
     path = Path(path)
     if not (np.isfinite(timestep) and timestep > 0.0):

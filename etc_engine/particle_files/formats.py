@@ -148,7 +148,7 @@ def write_particles(path: Path | str, table: ParticleTable, attributes: Attribut
 def read_particles(
     path: Path | str, box: Box | None = None, frame: int | None = None, sample: Sample | None = None
 ) -> ParticleTable:
-    """Particles of a file of any known format, told apart by their content: the one door to read them.
+    """Particles of a file in any known format; the content of the file decides the format.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Sample:
-    """What the user says about the part of a file that is wanted.
+    """The wanted part of a particle file.
 
     Parameters
     ----------

@@ -28,11 +28,11 @@ class Status(IntEnum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What solving one medium by one method came to.
+    """Result of one medium solved by one method.
 
     ``conductivity`` has shape (d, d) [W/(m K)], None after a failure; components a walled box does not define are NaN.
     ``mean_field_conductivity`` [W/(m K)] is the contact mean field of the same network. ``model_error_estimate`` is
-    what the method is estimated to miss, where it has an estimate: ``chord`` solved in full, ``exact`` by its bounds.
+    the estimated error of the method, where it has one: ``chord`` solved in full, ``exact`` by its bounds.
     ``solved_by`` is ``full``, or ``reduced`` where the conductivity comes from the solutions at other
     contact angles, ``snapshots`` of them. ``conductivity_bounds`` [W/(m K)] are the lower and upper bound along each
     axis, of method ``exact`` only. ``heat_imbalance`` is the difference of the heat in at one wall and out at the other
@@ -59,7 +59,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Realization:
-    """What one realization gave; ``cells`` in the order of the specification, methods running fastest."""
+    """Result of one realization; ``cells`` in the order of the specification, methods running fastest."""
 
     particles: int
     density: float

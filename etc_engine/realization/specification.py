@@ -14,7 +14,7 @@ from etc_engine.particle_files.collection import PackingSource
 
 @dataclass(frozen=True)
 class RealizationSpec:
-    """What is packed, and every medium that is made of the packing and solved.
+    """Specification of one realization: the packing, and every medium made of it and solved.
 
     Parameters
     ----------

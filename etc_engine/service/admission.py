@@ -1,4 +1,4 @@
-"""Admission: what a study asks for, told and limited before anything runs."""
+"""Admission: the cost of a study, estimated and limited before anything runs."""
 
 from __future__ import annotations
 

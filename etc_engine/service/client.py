@@ -42,7 +42,7 @@ Told = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class Server:
-    """Where the service is, and what it wants to see.
+    """Address and credentials of a service.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Server:
 
 
 def submit(server: Server, study: str | Mapping[str, Any]) -> dict[str, Any]:
-    """Hand in a study: the text of a study file, or the same as a mapping. Answers its status, with its ``id``.
+    """Hand in a study: the text of a study file, or the same as a mapping. Returns its status, with its ``id``.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the service says and is told, as the OpenAPI description shows it."""
+"""Messages to and from the service, as the OpenAPI description shows them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class StudySummary(BaseModel):
     planned: int = Field(description="packings planned so far; an adaptive study may grow")
     most: int = Field(description="packings at most")
     failed_cells: int = Field(description="results of a finished study that have no conductivity")
-    submitted: str = Field(description="time in ISO 8601, UTC; likewise the next two, where they have come")
+    submitted: str = Field(description="time in ISO 8601, UTC; the next two as well, once they exist")
     started: str
     ended: str
 
@@ -56,7 +56,7 @@ class StudyList(BaseModel):
 class Submitted(StudySummary):
     """A study that has been handed in."""
 
-    new: bool = Field(description="False if the same study was there already: its result is the answer")
+    new: bool = Field(description="False if the same study was there already: its result is returned")
 
 
 class Estimate(BaseModel):

@@ -1,4 +1,4 @@
-"""Processes of batches: told apart from others that have their number by now, and from all that are not ours."""
+"""Processes of batches: distinguished from later processes with the same number, and from foreign ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Conjugate gradients with an algebraic multigrid preconditioner, stopped on the error of the answer.
+r"""Conjugate gradients with an algebraic multigrid preconditioner, stopped on the error of the energy.
 
 The conductivity is an energy, E = E_lift - b . u, so the iterate u_k overestimates it by exactly
 |u - u_k|_K^2: the error that matters is quadratic in the error of the temperatures. CG knows it. With
@@ -59,7 +59,7 @@ class Preconditioner:
 
 @dataclass(frozen=True)
 class SolveReport:
-    """What one solve took and what it reached.
+    """Cost and accuracy of one solve.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ def march(
     restart : MarchState, optional
         A state at one of the times, to go on from; all other arguments are those of the start.
     progress : callable, optional
-        Told the time after every step.
+        Called with the time after every step.
 
     Yields
     ------

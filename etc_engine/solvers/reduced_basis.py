@@ -89,7 +89,7 @@ class Member:
     apply : callable
         Rows t in, K t out, shapes (rows, q).
     matrix : callable
-        Answers K over the free values, a csr_matrix; called for snapshots only.
+        Returns K over the free values as a csr_matrix; called for snapshots only.
     floor : callable
         Another member in, a c > 0 with K >= c K_0 out, K_0 that member's.
     """

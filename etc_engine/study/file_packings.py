@@ -126,7 +126,7 @@ class FileStudy(Study):
 
     @property
     def quantities(self) -> dict[str, tuple[float, ...]]:
-        """As of any sweep; no conductivity of the particles where each has its own."""
+        """As in any sweep; without the conductivity of the particles where each has a separate one."""
         found = super().quantities
         if self.by_particle:
             found.pop("particle_conductivity", None)

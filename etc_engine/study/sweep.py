@@ -304,8 +304,8 @@ def study_of(content: Mapping[str, Any], source: str = "study", folder: Path | N
 def study_schema() -> dict[str, Any]:
     """The JSON schema of a study file, with an example.
 
-    Beside the standard words, a key that only has a meaning with some words of a choice names them in ``x-with``, and
-    the words of a key that depends on another choice stand in ``x-words``.
+    Two words are added to the standard. ``x-with`` lists the words of a choice with which a key is valid. ``x-words``
+    lists the words of a key that depend on another choice.
 
     Examples
     --------

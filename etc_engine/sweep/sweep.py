@@ -72,7 +72,7 @@ class Outcome:
 
 
 def _silent(*_: object) -> None:
-    """Tell nobody."""
+    """Report to nobody."""
 
 
 def sweep(
@@ -136,7 +136,7 @@ def _run_rounds(
 ) -> tuple[Table, int, str]:
     """Compute round after round until every cell is settled.
 
-    Answers the table (on rank 0), how many units all ranks have computed, and why they stopped if they did.
+    Returns the table (on rank 0), how many units all ranks have computed, and why they stopped if they did.
     """
     gatherer, computed = Gatherer(claim.study, claim.folder, communicator), 0
     targets = (claim.study.statistics.realizations,) * len(claim.study.densities)

@@ -168,7 +168,7 @@ def effective_diffusivity(
 
     Notes
     -----
-    Particles that hang on nothing stay cold for ever; they count neither in the means nor in (rho c)_eff.
+    Particles without a path to a wall stay cold; they count neither in the means nor in (rho c)_eff.
 
     Examples
     --------

@@ -137,7 +137,7 @@ class Stepping:
     scheme : str
         A name of `etc_engine.solvers.marching.SCHEMES`.
     steps : int
-        Steps from frame to frame; ``adaptive`` finds its own.
+        Steps from frame to frame; ``adaptive`` chooses them.
     tolerance, solver_tolerance : float
         As in `etc_engine.solvers.marching.march`.
     progress : callable, optional

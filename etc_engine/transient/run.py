@@ -175,7 +175,7 @@ def _still(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Cou
 
 
 def _moving(study: NetworkStudy, folder: Path, progress: Progress | None) -> _Course:
-    """All frames of a dump, each with contacts of its own."""
+    """All frames of a dump, each with separate contacts."""
     motion, time, file = study.motion, study.time, study.packing
     assert motion is not None
     assert isinstance(file, FileTable)

@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 
 import etc_engine
+from etc_engine.models import CATALOGUE
 
 STUDIES = Path(__file__).parents[1]
 NOTEBOOKS = STUDIES / "site" / "notebooks"
@@ -52,6 +53,22 @@ def gallery() -> str:
     return "\n".join(["| study | result |", "| --- | --- |", *rows])
 
 
+def study_keys() -> str:
+    """Return the keys of study files, as the README of the studies lists them."""
+    text = (STUDIES / "README.md").read_text()
+    part = text[text.index("## Study files") : text.index("## From a sweep")].partition("\n")[2]
+    return re.sub(r"\]\((?![#/.]|https?:)", "](../", part)
+
+
+def models() -> str:
+    """Return one row per conductivity model: its name, where it holds and its source."""
+    rows = []
+    for name, model in CATALOGUE.items():
+        where = ", ".join(f"{d}D" for d in model.dimensions)
+        rows.append(f"| `{name}` | {where} | {model.kind} | {model.reference} |")
+    return "\n".join(["| model | holds in | kind | source |", "| --- | --- | --- | --- |", *rows])
+
+
 def notebook(path: Path) -> str:
     """Return a notebook in percent format as a page: its words, and its code in fences."""
     _, *parts = re.split(r"^# %%(.*)\n", path.read_text(), flags=re.M)
@@ -62,6 +79,10 @@ def notebook(path: Path) -> str:
         else:
             page.append(f"```python\n{body.strip()}\n```")
     return "\n\n".join(page)
+
+
+MADE = {"<!-- gallery -->": gallery, "<!-- study keys -->": study_keys, "<!-- models -->": models}
+"""Marks on pages, and what takes their place."""
 
 
 def without_bars(lines: list[str]) -> list[str]:
@@ -94,9 +115,10 @@ def literal_formulas(app: object, what: str, name: str, thing: object, options: 
 
 
 def fill(app: object, name: str, source: list[str]) -> None:
-    """Put gallery and notebooks in their places; turn links that leave the sources to pages that hold their target."""
-    if name == "site/gallery":
-        source[0] = source[0].replace("<!-- gallery -->", gallery())
+    """Put what is made into its places; turn links that leave the sources to pages that hold their target."""
+    for mark, make in MADE.items():
+        if mark in source[0]:
+            source[0] = source[0].replace(mark, make())
     source[0] = re.sub(r"<!-- notebook (\w+) -->", lambda found: notebook(NOTEBOOKS / f"{found[1]}.py"), source[0])
     for path, page in OUTSIDE.items():
         source[0] = re.sub(rf"\]\((\.\./)+{re.escape(path)}(#[\w-]*)?\)", rf"](/site/{page}.md\2)", source[0])

@@ -91,7 +91,7 @@ def family_of(method: str, medium: Medium) -> tuple[Family, str]:
     Raises
     ------
     InputError
-        If the pores insulate, and the method has no limit of its own for that.
+        If the pores insulate, and the method has no limit for that.
     """
     family = FAMILIES.get((method, medium.dimension), CONTACTS)
     if family is CONTACTS or medium.pores.conduct:

@@ -1,4 +1,4 @@
-r"""What ``chord`` is estimated to miss, from its own heat flows.
+r"""Estimated error of ``chord``, from its heat flows.
 
 ``chord`` is exact for one chord and a far source. Heat that passes a disk along its other contacts finds a segment
 cut away there, the flux through a contact is not the uniform one of the mutual resistances, and the temperatures on

@@ -1,4 +1,4 @@
-r"""What ``chord`` is estimated to miss for spheres, from its own heat flows.
+r"""Estimated error of ``chord`` for spheres, from its heat flows.
 
 ``chord`` takes the temperature to vary in the same way along the two sides of a contact. Where the slopes G_A and G_B
 of the two spheres along it differ, heat crosses the disk in one half and returns in the other. A disk of radius c

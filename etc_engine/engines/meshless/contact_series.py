@@ -78,7 +78,7 @@ def heat_disk_by_flows(
         Time steps up to the last output time of each decade: earlier times, where the flows change faster, are
         marched again from the start in shorter steps.
     decades : int
-        How many of the last decades are marched on their own; what is earlier goes with the first of them. Shorter
+        How many of the last decades are marched on their own; earlier times join the first of them. Shorter
         steps than the boundary nodes can follow end in a `DiscretizationWarning`.
     **disk
         ``radius``, ``conductivity``, ``heat_capacity`` and ``initial`` of `heat_disk_through_arcs`.

@@ -15,7 +15,7 @@ from etc_engine.errors import InputError
 
 Field = NDArray
 
-#: A constant, or a function of positions (k, 2) [m] and time [s] that answers (k,) values or one.
+#: A constant, or a function of positions (k, 2) [m] and time [s] that returns (k,) values or one.
 Data = float | Callable[[Floats, float], Floats | float]
 #: The Laplace transform of such data: a function of positions (k, 2) and complex s [1/s].
 Transform = Callable[[Floats, complex], Field | complex]
@@ -154,7 +154,7 @@ class HeatProblem:
     heat_capacity : float [J/(m3 K)]
         rho c, positive.
     initial : float or callable (x) [K]
-        Initial temperature; a callable takes positions of shape (n, 2) and answers (n,) values.
+        Initial temperature; a callable takes positions of shape (n, 2) and returns (n,) values.
     boundary : sequence of Dirichlet, Neumann or Convective
         One condition per edge, in the order of the edges.
     source : float or callable (x, t), optional [W/m3]
@@ -236,7 +236,7 @@ def sample(data: Data, points: Floats, t: float, what: str) -> Floats:
     Raises
     ------
     InputError
-        If a callable answers another shape than (k,) or one number, or a value is not finite.
+        If a callable returns another shape than (k,) or one number, or a value is not finite.
     """
     values = data(points, t) if callable(data) else data
     try:

@@ -123,7 +123,7 @@ def voxelize(medium: Medium, resolution: int = 64, voxels: str = "laminate") -> 
     medium : Medium
         Its box is filled; periodic axes repeat the inclusions, walls cut them.
     resolution : int
-        Voxels along the shortest edge of the box; the others get as many as make the voxels most nearly cubic.
+        Voxels along the shortest edge of the box; along the others the number that makes the voxels most nearly cubic.
     voxels : str
         ``laminate``: a voxel that an interface crosses conducts like layers of its phases, in their exact volume
         fractions, normal to the direction from the inclusion's centre to the voxel's. ``binary``: every voxel has the
