@@ -24,6 +24,12 @@ from etc_engine.sweep.statistics import interval
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "studies" / "site"
 PAGES = [ROOT / "README.md", *sorted(SITE.rglob("*.md"))]
+READ = [
+    *PAGES,
+    ROOT / "jobs" / "README.md",
+    *sorted((ROOT / "studies").glob("*.md")),
+    *(ROOT / "studies").glob("*/README.md"),
+]
 FENCE = re.compile(r"^(?:<!-- ([\w ]+) -->\n)?```(\w+)\n(.*?)^```", re.M | re.S)
 
 
@@ -33,7 +39,7 @@ def blocks(page: Path, language: str) -> list[tuple[str, str]]:
 
 
 def named(page: Path) -> str:
-    return page.stem
+    return f"{page.parent.name}-{page.stem}" if page.stem == "README" else page.stem
 
 
 @pytest.mark.timeout(300)
@@ -63,24 +69,26 @@ def test_the_first_page_is_one_screen():
     assert [line for line in lines if len(line) > 110] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=named)
+@pytest.mark.parametrize("page", READ, ids=named)
 def test_every_link_inside_leads_to_a_file(page):
     text = re.sub(r"```.*?```", "", page.read_text(), flags=re.S)
     links = re.findall(r"\]\(([^)\s#]+)(?:#[\w-]*)?\)", text) + re.findall(r'src="([^"]+)"', text)
     assert [link for link in links if "://" not in link and not (page.parent / link).exists()] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=named)
+@pytest.mark.parametrize("page", READ, ids=named)
 def test_every_command_has_the_options_it_is_shown_with(page):
     for _, text in blocks(page, "sh"):
         for line in text.replace("\\\n", " ").splitlines():
-            words = shlex.split(line, comments=True)
-            if "etc-engine" not in words:
+            if not re.search(r"\betc-engine [a-z]", line.partition("#")[0]):
                 continue
+            words = shlex.split(line, comments=True)
             name, *rest = words[words.index("etc-engine") + 1 :]
             command = cli.get_command(click.Context(cli), name)
             known = {word for parameter in command.params for word in parameter.opts}
-            assert {word.partition("=")[0] for word in rest if re.match(r"--?[a-z]", word)} <= known, line
+            assert {word.partition("=")[0] for word in rest if re.fullmatch(r"--?[a-z][\w-]*(=\S*)?", word)} <= known, (
+                line
+            )
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=named)
