@@ -80,10 +80,10 @@ def test_every_link_inside_leads_to_a_file(page):
 def test_every_command_has_the_options_it_is_shown_with(page):
     for _, text in blocks(page, "sh"):
         for line in text.replace("\\\n", " ").splitlines():
-            if not re.search(r"\betc-engine [a-z]", line.partition("#")[0]):
+            call = re.search(r"\betc-engine ([a-z].*)", line.partition("#")[0].rstrip(") "))
+            if call is None:
                 continue
-            words = shlex.split(line, comments=True)
-            name, *rest = words[words.index("etc-engine") + 1 :]
+            name, *rest = shlex.split(call[1])
             command = cli.get_command(click.Context(cli), name)
             known = {word for parameter in command.params for word in parameter.opts}
             assert {word.partition("=")[0] for word in rest if re.fullmatch(r"--?[a-z][\w-]*(=\S*)?", word)} <= known, (
