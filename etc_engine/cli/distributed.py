@@ -119,7 +119,7 @@ def _solve(
 def _refuse_unheeded(given: dict[str, Any], asked: SolveRequest) -> None:
     """Refuse options that mean nothing here."""
     physics = asked.physics
-    for name in ("gas", "emissivity", "roughness", "wall_temperatures"):
+    for name in ("gas", "emissivity", "roughness", "area_resistance", "wall_temperatures"):
         given[f"--{name.replace('_', '-')}"] = getattr(physics, name)
     given |= {"--pore-conductivity": asked.pore_conductivity, "--modes": asked.modes, "--degree": asked.degree}
     found = [name for name, value in {**given, "--bounds": asked.bounds}.items() if value]

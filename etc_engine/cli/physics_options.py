@@ -32,6 +32,11 @@ OPTIONS = (
         "--simulated-modulus", type=float, help="Young's modulus that the DEM run used [Pa]. With --rule hertz."
     ),
     click.option("--load", type=float, help="Mean stress carried by the contacts [Pa]. With --rule load."),
+    click.option(
+        "--area-resistance",
+        type=float,
+        help="Resistance of a unit of contact area, walls included [m2 K/W]; exact of disks resolves it.",
+    ),
     click.option("--roughness", help="Height [m], slope and hardness [Pa] of rough contacts: 1e-6,0.1,4e9."),
     click.option("--material", help="Solid by name, see etc-engine materials. Needs --temperature."),
     click.option("--gas", help="Gas in the pores by name, see etc-engine materials."),
@@ -58,6 +63,7 @@ class PhysicsWords:
     poisson_ratio: float | None = None
     simulated_modulus: float | None = None
     load: float | None = None
+    area_resistance: float | None = None
     roughness: str | None = None
     material: str | None = None
     gas: str | None = None
@@ -195,8 +201,26 @@ class PhysicsWords:
                 raise InputError(f"the contact rule {word} also needs {_option(name)}")
         return rule.contacts(packing, **{rule.keys[name]: value for name, value in given.items() if name in rule.keys})
 
+    def refuse_two_resistances(self, contact_resistance: float) -> None:
+        """Refuse two options that both say what a contact resists.
+
+        Raises
+        ------
+        InputError
+        """
+        from etc_engine.errors import InputError
+
+        resist = {
+            "--contact-resistance": contact_resistance > 0.0,
+            "--area-resistance": self.area_resistance is not None,
+            "--roughness": self.roughness is not None,
+        }
+        given = [option for option, word in resist.items() if word]
+        if len(given) > 1:
+            raise InputError(f"{given[0]} and {given[1]} both resist at contacts: leave one of them out")
+
     def roughened(self, network: ContactNetwork, conductivity: Any, pores: Pores) -> ContactNetwork:
-        """The contacts with the area resistance of rough surfaces, if they are.
+        """The contacts with the area resistance asked for, or that of rough surfaces.
 
         Raises
         ------
@@ -204,7 +228,7 @@ class PhysicsWords:
             If the words cannot be read, or the elastic constants are missing.
         """
         if self.roughness is None:
-            return network
+            return network if self.area_resistance is None else network.with_area_resistance(self.area_resistance)
         import numpy as np
 
         from etc_engine.errors import InputError

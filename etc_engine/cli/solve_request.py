@@ -52,8 +52,7 @@ class SolveRequest:
                     "--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap"
                 )
             raise InputError(f"--bond-gap means nothing to the contact rule {self.rule}: leave it out")
-        if self.contact_resistance > 0.0 and self.physics.roughness is not None:
-            raise InputError("--contact-resistance and --roughness both resist at contacts: leave one of them out")
+        self.physics.refuse_two_resistances(self.contact_resistance)
 
     @property
     def bonded(self) -> bool:
@@ -109,8 +108,7 @@ class SolveRequest:
         half_angle = None if self.contact_angle is None else radians(self.contact_angle)
         network = dumped or self.physics.network(table.packing, half_angle, self.bond_gap)
         pores = self.physics.pores(table.packing, self.pore_conductivity)
-        if self.contact_resistance > 0.0 or self.physics.roughness is None:
-            network = network.with_resistance(self.contact_resistance)
+        network = network.with_resistance(self.contact_resistance)
         network = self.physics.roughened(network, kappa, pores)
         return Medium(table.packing, kappa, network, pores)
 

@@ -38,16 +38,18 @@ class ContactNetwork:
         The image of j that i touches: its centre lies at ``x_j + shift * lengths``.
     angles : ndarray, shape (m, 2) [rad]
         Half-angle of the contact on i and on j; 0 on a link without a contact, a gap.
-    resistances : ndarray, shape (m,) [K/W, in 2D m K/W]
-        Resistance of each contact, in series with what the particles resist.
+    lumped_resistances : ndarray, shape (m,) [K/W, in 2D m K/W]
+        Resistance of each contact as one number, in series with what the particles resist.
     wall_particles, walls : ndarray of int, shape (w,)
         Particle and wall of each wall contact; wall ``2 * axis`` lies at 0, ``2 * axis + 1`` at the far end.
     wall_angles : ndarray, shape (w,) [rad]
         Half-angle of each wall contact.
-    wall_resistances : ndarray, shape (w,) [K/W, in 2D m K/W]
-        Resistance of each wall contact.
+    wall_lumped_resistances : ndarray, shape (w,) [K/W, in 2D m K/W]
+        Likewise of each wall contact.
     rule : str
         Name of the contact rule that made it, a key of `etc_engine.medium.rules.RULES`.
+    area_resistances : ndarray, shape (m + w,), optional [m2 K/W]
+        Resistance of a unit of contact area, of each particle contact and then each wall contact; none by default.
 
     Notes
     -----
@@ -58,12 +60,13 @@ class ContactNetwork:
     pairs: Ints
     shifts: Ints
     angles: Floats
-    resistances: Floats
+    lumped_resistances: Floats
     wall_particles: Ints
     walls: Ints
     wall_angles: Floats
-    wall_resistances: Floats
+    wall_lumped_resistances: Floats
     rule: str
+    area_resistances: Floats | None = None
 
     @property
     def count(self) -> int:
@@ -87,6 +90,33 @@ class ContactNetwork:
         lengths = np.asarray(self.packing.box.lengths)
         return centers[self.pairs[:, 1]] - centers[self.pairs[:, 0]] + self.shifts * lengths
 
+    @cached_property
+    def reaches(self) -> Floats:
+        """Half-width (radius) of every particle contact and then every wall contact, shape (m + w,) [m].
+
+        R sin(alpha); where both sides of a contact have one, the smaller counts.
+        """
+        radii = self.packing.radii
+        between = (radii[self.pairs] * np.sin(self.angles)).min(axis=1, initial=np.inf)
+        return np.concatenate([between, radii[self.wall_particles] * np.sin(self.wall_angles)])
+
+    @cached_property
+    def _totals(self) -> Floats:
+        lumped = np.concatenate([self.lumped_resistances, self.wall_lumped_resistances])
+        if self.area_resistances is None:
+            return lumped
+        return lumped + over_area(self.area_resistances, self.reaches, self.packing.dimension)
+
+    @property
+    def resistances(self) -> Floats:
+        """Whole resistance of each particle contact, that over its area included, shape (m,) [K/W, in 2D m K/W]."""
+        return self._totals[: self.count]
+
+    @property
+    def wall_resistances(self) -> Floats:
+        """Whole resistance of each wall contact, that over its area included, shape (w,) [K/W, in 2D m K/W]."""
+        return self._totals[self.count :]
+
     def walls_of(self, axis: int) -> Ints:
         """Row numbers of the contacts with the two walls normal to an axis."""
         return np.flatnonzero(self.walls // 2 == axis)
@@ -102,7 +132,7 @@ class ContactNetwork:
         )
 
     def with_resistance(self, resistance: ArrayLike) -> ContactNetwork:
-        """The same contacts with given resistances.
+        """The same contacts with given resistances, each as one number; that over the contact area stays.
 
         Parameters
         ----------
@@ -115,10 +145,10 @@ class ContactNetwork:
             If a resistance is negative or not finite, or there is not one per contact.
         """
         values = _resistances(resistance, self.count + self.walls.size)
-        return replace(self, resistances=values[: self.count], wall_resistances=values[self.count :])
+        return replace(self, lumped_resistances=values[: self.count], wall_lumped_resistances=values[self.count :])
 
     def with_area_resistance(self, area_resistance: ArrayLike) -> ContactNetwork:
-        """The same contacts with the resistance of a unit of contact area over each contact's area.
+        """The same contacts with a given resistance of a unit of contact area, in series with what they had.
 
         Parameters
         ----------
@@ -128,22 +158,18 @@ class ContactNetwork:
         Raises
         ------
         InputError
-            As `with_resistance`.
+            As `with_resistance`; and if a contact that resists has no area.
 
         Notes
         -----
-        The area of a contact is the chord 2 R sin(alpha) of a disk per unit thickness and the disk pi (R sin(alpha))^2
-        of a sphere; where both sides of a contact have one, the smaller counts.
+        The temperature jumps by r q, q the local heat flux. Method ``exact`` of disks resolves q over the contact; all
+        other methods take the jump as uniform, so that the contact resists r/A. The area A of a contact is the chord
+        2 R sin(alpha) of a disk per unit thickness and the disk pi (R sin(alpha))^2 of a sphere; where both sides of a
+        contact have one, the smaller counts.
         """
         values = _resistances(area_resistance, self.count + self.walls.size)
-        radii = self.packing.radii
-        reach = np.concatenate(
-            [
-                (radii[self.pairs] * np.sin(self.angles)).min(axis=1),
-                radii[self.wall_particles] * np.sin(self.wall_angles),
-            ]
-        )
-        return self.with_resistance(values / ball_measure(reach, self.packing.dimension - 1))
+        _resistances(over_area(values, self.reaches, self.packing.dimension), values.size)
+        return replace(self, area_resistances=values if values.any() else None)
 
     def cut_measures(self, *, prescribed: bool = False) -> Floats:
         """Area (volume) of each particle less what its contacts cut off, shape (n,) [m2, in 3D m3].
@@ -171,12 +197,24 @@ class ContactNetwork:
             pairs=self.pairs[contacts],
             shifts=self.shifts[contacts],
             angles=self.angles[contacts],
-            resistances=self.resistances[contacts],
+            lumped_resistances=self.lumped_resistances[contacts],
             wall_particles=self.wall_particles[wall_contacts],
             walls=self.walls[wall_contacts],
             wall_angles=self.wall_angles[wall_contacts],
-            wall_resistances=self.wall_resistances[wall_contacts],
+            wall_lumped_resistances=self.wall_lumped_resistances[wall_contacts],
+            area_resistances=None
+            if self.area_resistances is None
+            else self.area_resistances[np.concatenate([contacts, wall_contacts])],
         )
+
+
+def over_area(area_resistances: Floats, reaches: Floats, dimension: int) -> Floats:
+    """Resistance r/A of contacts of half-width (radius) c, 0 where r is 0, shape (s,) [K/W, in 2D m K/W]."""
+    resists = area_resistances > 0.0
+    total = np.zeros_like(area_resistances)
+    with np.errstate(divide="ignore"):
+        total[resists] = area_resistances[resists] / ball_measure(reaches[resists], dimension - 1)
+    return total
 
 
 def _resistances(values: ArrayLike, size: int) -> Floats:

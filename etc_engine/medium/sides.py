@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -10,7 +10,7 @@ from numba import njit
 from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import GeometryError
 from etc_engine.laws.by_dimension import law_of
-from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.network import ContactNetwork, over_area
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +53,13 @@ class ContactSides:
         differ by the branch vector.
     alpha : ndarray, shape (s,) [rad]
         Half-angle of the contact.
-    resistances : ndarray, shape (s,) [K/W, in 2D m K/W]
+    lumped_resistances : ndarray, shape (s,) [K/W, in 2D m K/W]
         Part of the contact's resistance that belongs to the side: half of it on either side of a particle contact,
         all of it on the one side of a wall contact.
+    area_resistances : ndarray, shape (s,) [m2 K/W]
+        Likewise of the resistance of a unit of contact area.
+    reaches : ndarray, shape (s,) [m]
+        Half-width of the contact, as of `ContactNetwork.reaches`.
     radii : ndarray, shape (n,) [m]
         Of the particles.
     of_contacts : ndarray of int, shape (m, 2)
@@ -70,7 +74,9 @@ class ContactSides:
     nodes: Ints
     arms: Floats
     alpha: Floats
-    resistances: Floats
+    lumped_resistances: Floats
+    area_resistances: Floats
+    reaches: Floats
     radii: Floats
     of_contacts: Ints
     of_walls: Ints
@@ -85,6 +91,18 @@ class ContactSides:
     def particles(self) -> Ints:
         """Particle of each side, shape (s,)."""
         return np.repeat(np.arange(self.offsets.size - 1), np.diff(self.offsets))
+
+    @property
+    def resistances(self) -> Floats:
+        """Part of the whole resistance of the contact that belongs to the side, shape (s,) [K/W, in 2D m K/W]."""
+        return self.lumped_resistances + over_area(self.area_resistances, self.reaches, self.dimension)
+
+    def with_half_angle(self, half_angle: float) -> ContactSides:
+        """The same contacts, all with one half-angle [rad] on either side."""
+        alpha, radii = np.full_like(self.alpha, half_angle), self.radii[self.particles]
+        reaches = radii * np.sin(alpha)
+        reaches[self.of_contacts] = reaches[self.of_contacts].min(axis=1, keepdims=True, initial=np.inf)
+        return replace(self, alpha=alpha, reaches=reaches)
 
     @property
     def mode_signs(self) -> Floats:
@@ -132,8 +150,9 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
         ]
     )
     alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
-    half = 0.5 * network.resistances
-    resistances = np.concatenate([half, half, network.wall_resistances])
+    parts = np.concatenate([np.full(2 * m, 0.5), np.ones(network.walls.size)])
+    lumped = parts * np.concatenate([network.lumped_resistances, network.wall_lumped_resistances])[nodes]
+    area = np.zeros(nodes.size) if network.area_resistances is None else parts * network.area_resistances[nodes]
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=packing.count))])
     place = np.empty_like(order)
@@ -143,7 +162,9 @@ def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> Con
         nodes=nodes[order],
         arms=arms[order],
         alpha=alpha[order],
-        resistances=resistances[order],
+        lumped_resistances=lumped[order],
+        area_resistances=area[order],
+        reaches=network.reaches[nodes][order],
         radii=packing.radii,
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],

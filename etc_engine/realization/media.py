@@ -126,7 +126,7 @@ def contact_network(packing: ParticlePacking, word: str, values: Values) -> Cont
     word : str
         Of the rule.
     values : mapping of str to float
-        Keys of the rule, and ``contact_resistance``, in SI units.
+        Keys of the rule, ``contact_resistance`` and ``area_resistance``, in SI units.
     """
     return _network(packing, word, values, {})
 
@@ -138,7 +138,8 @@ def _network(
     rule = find_rule(word)
     own = {key: values[key] for key in rule.keys if key in values}
     resistance, angle = values.get("contact_resistance", 0.0), own.get("contact_angle", 0.0)
-    whole = (*own.values(), resistance)
+    film = values.get("area_resistance", 0.0)
+    whole = (*own.values(), resistance, film)
     if whole not in found:
         pairs = tuple(value for key, value in own.items() if key != "contact_angle")
         if pairs not in found:
@@ -146,7 +147,7 @@ def _network(
         network = found[pairs]
         if "contact_angle" in own:
             network = network.with_half_angle(angle)
-        found[whole] = network.with_resistance(resistance)
+        found[whole] = network.with_resistance(resistance).with_area_resistance(film)
     return found[whole]
 
 

@@ -306,6 +306,7 @@ async def solve(
     bond_gap: Annotated[Finite, Query(description="largest bonded gap, in mean radii")] = None,
     conductivity: Annotated[Finite, Query(description="of the particles [W/(m K)]")] = None,
     contact_resistance: Annotated[Finite, Query(description="of a contact [m K/W]")] = None,
+    area_resistance: Annotated[Finite, Query(description="of a unit of contact area [m2 K/W]")] = None,
 ) -> Solved:
     """Effective conductivity of the particles in the body; formats and options are those of ``etc-engine solve``."""
     given = {
@@ -319,6 +320,7 @@ async def solve(
         "bond-gap": bond_gap,
         "conductivity": conductivity,
         "contact-resistance": contact_resistance,
+        "area-resistance": area_resistance,
     }
     options = [f"--{name}={value}" for name, value in given.items() if value is not None]
     runner = _service(request).runner

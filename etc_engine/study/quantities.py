@@ -143,6 +143,14 @@ QUANTITIES: Mapping[str, Quantity] = {
             plane="m K W-1",
         ),
         Quantity(
+            "contacts.area_resistance",
+            "m2 K W-1",
+            "thermal resistance of a unit of contact area",
+            "contacts",
+            NotNegative,
+            NOT_NEGATIVE,
+        ),
+        Quantity(
             "contacts.youngs_modulus",
             "Pa",
             "Young's modulus of the particles",

@@ -152,6 +152,8 @@ class ContactsTable(QuantityTable):
 
     @model_validator(mode="after")
     def _check(self) -> ContactsTable:
+        if self.roughness is not None and getattr(self, "area_resistance", None) is not None:
+            raise ValueError("area_resistance and roughness are both a resistance of the contact area, take one out")
         needs = dict.fromkeys(RULES[self.rule].needs, f"rule = {self.rule!r}")
         for choice in ("simulated_modulus", "roughness"):
             if getattr(self, choice) is not None:

@@ -133,6 +133,8 @@ def test_impossible_geometries_are_refused(etc_engine, disks):
         (("--method", "spline"), "engine dtem has no method 'spline': expected one of chord"),
         (("--conductivity", 0), "conductivity must be positive"),
         (("--contact-resistance", -1), "contact resistance must be >= 0"),
+        (("--area-resistance", -1), "contact resistance must be >= 0"),
+        (("--contact-resistance", 1, "--area-resistance", 1), "--contact-resistance and --area-resistance both resist"),
         (("--box", "1"), "2 or 3 edge lengths"),
         (("--box", "1,-1"), "positive"),
         (("--box", "a,b"), "--box takes"),
@@ -142,6 +144,17 @@ def test_impossible_geometries_are_refused(etc_engine, disks):
 )
 def test_bad_options_are_refused(etc_engine, options, words):
     assert words in refused(etc_engine("solve", TABLE_2, "--box", "1,1", *options))
+
+
+def test_a_resistance_over_the_contact_area(etc_engine, tmp_path):
+    """One disk between walls: r over the two chords of half-width sqrt(.52^2 - .5^2), and the disk."""
+    one = tmp_path / "one.csv"
+    one.write_text("x,y,radius\n0.5,0.5,0.52\n")
+    done = etc_engine("solve", one, "--box", "1,1.2", "--area-resistance", 1e4, "--method", "exact", "--json")
+    found = json.loads(done.stdout)
+    reach = np.sqrt(0.52**2 - 0.5**2)
+    assert found["conductivity"] == pytest.approx(reach / 1e4 / 1.2, rel=3e-4)
+    assert found["model_error_estimate"] < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -109,14 +109,14 @@ def loaded_disk(solution, p):
     sides = solution.sides
     chords = cut_chords(sides, solution.medium.conductivity, modes=solution.modes)
     points = chord_points(chords.levels)
-    theta, alpha, exponents, levels = of_disk(chords, p)
+    theta, alpha, fluxes, levels = of_disk(chords, p)
     rows = chords.rows[chords.offsets[p] : chords.offsets[p + 1]]
     coefficients = np.where(rows[:, None] >= 0, solution.flows[rows, :, 0], 0.0)
     coefficients[:, 1::2] *= chords.signs[chords.offsets[p] : chords.offsets[p + 1], None]
     h = np.empty((coefficients.size,) * 2)
-    offsets, densities, _ = solve_cut_disk(theta, alpha, exponents, levels, solution.modes, points, h)
-    waves = chord_waves(alpha, exponents, levels, offsets, densities @ coefficients.ravel(), coefficients, points)
-    return theta, alpha, waves, h @ coefficients.ravel(), exponents
+    offsets, densities, _ = solve_cut_disk(theta, alpha, fluxes, levels, points, h)
+    waves = chord_waves(alpha, fluxes, levels, offsets, densities @ coefficients.ravel(), coefficients, points)
+    return theta, alpha, waves, h @ coefficients.ravel(), fluxes.exponents
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,14 @@ from etc_engine.box import Box
 from etc_engine.engines.dtem.conductivity import element_conductivity
 from etc_engine.engines.dtem.exact.cut_disk import solve_cut_disk
 from etc_engine.engines.dtem.exact.element import edge_exponents, exact_elements
-from etc_engine.engines.dtem.exact.lune import LEVELS, chord_points, log_gamma, mode_weights
+from etc_engine.engines.dtem.exact.lune import (
+    LEVELS,
+    PROFILE_POINTS,
+    FluxModes,
+    chord_points,
+    log_gamma,
+    mode_weights,
+)
 from etc_engine.engines.dtem.field import recover_field
 from etc_engine.errors import GeometryError, InputError
 from etc_engine.laws.disk import mutual_resistance, self_resistance
@@ -28,9 +35,8 @@ def points():
 
 def resistances(theta, alpha, exponents, levels, modes, points):
     h = np.empty((len(theta) * modes,) * 2)
-    solve_cut_disk(
-        np.array(theta, float), np.array(alpha, float), np.array(exponents, float), np.array(levels), modes, points, h
-    )
+    fluxes = FluxModes(np.array(exponents, float), np.zeros((0, modes, PROFILE_POINTS)))
+    solve_cut_disk(np.array(theta, float), np.array(alpha, float), fluxes, np.array(levels), points, h)
     return h
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -108,11 +108,11 @@ def elements_at(load: ElementGeometry, half_angle: float) -> Elements:
     GeometryError
         Where the arcs do not fit.
     """
-    sides = replace(load.sides, alpha=np.full_like(load.sides.alpha, half_angle))
+    sides = load.sides.with_half_angle(half_angle)
     if load.every_side is None:
         check_arcs(sides)
     else:  # what carries no heat must still be a valid geometry
-        check_arcs(replace(load.every_side, alpha=np.full_like(load.every_side.alpha, half_angle)))
+        check_arcs(load.every_side.with_half_angle(half_angle))
     return load.variant.elements(sides, load.conductivity, load.modes)
 
 

@@ -7,6 +7,7 @@ from numba import njit
 
 from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.element import Resistances, contact_potentials, packed_starts
+from etc_engine.engines.dtem.uneven_film import uneven_film
 from etc_engine.laws.by_dimension import law_of, length_scales
 from etc_engine.medium.sides import ContactSides
 
@@ -21,7 +22,9 @@ def closed_form_resistances(
 ) -> Resistances:
     """Resistance matrices H of all disks or spheres in closed form.
 
-    H = (kappa R^(d-2) h_ij)/(kappa R^(d-2)), plus each side's share of the contact resistance on the diagonal.
+    H = (kappa R^(d-2) h_ij)/(kappa R^(d-2)), plus each side's share of the contact resistance on the diagonal. Where a
+    contact resists over its area, ``chord`` adds the excess of `etc_engine.engines.dtem.uneven_film.uneven_film`; the
+    flux of the other methods is uniform.
 
     Parameters
     ----------
@@ -45,7 +48,10 @@ def closed_form_resistances(
     law, starts = law_of(sides.dimension), packed_starts(sides.offsets)
     values = law.matrices(sides.offsets, sides.arms, sides.alpha, method, cutting)
     scales = np.ascontiguousarray(conductivity * length_scales(sides.radii, sides.dimension))
-    _scale(sides.offsets, starts, scales, sides.resistances, values)
+    resistances = sides.resistances
+    if method == "chord":
+        resistances = resistances + uneven_film(sides, conductivity)
+    _scale(sides.offsets, starts, scales, resistances, values)
     return Resistances(modes, starts, values, law.moments(sides.arms, sides.alpha))
 
 

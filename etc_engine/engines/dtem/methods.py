@@ -12,7 +12,7 @@ from etc_engine.engines.dtem.arc import arc_resistances
 from etc_engine.engines.dtem.closed_form import closed_form_potentials, closed_form_resistances
 from etc_engine.engines.dtem.element import Elements, Resistances, condensed_elements, contact_potentials
 from etc_engine.engines.dtem.exact import element as exact
-from etc_engine.engines.dtem.exact.element import exact_elements, exact_potentials
+from etc_engine.engines.dtem.exact.element import exact_drops, exact_elements, exact_potentials
 from etc_engine.engines.dtem.exact.spheres import DEGREE, exact_sphere_elements, exact_sphere_potentials
 from etc_engine.errors import InputError
 from etc_engine.laws.by_dimension import LAWS
@@ -21,6 +21,11 @@ from etc_engine.medium.sides import ContactSides
 
 MakeResistances = Callable[[ContactSides, Floats, int], Resistances]
 """(sides, conductivity of each particle, modes) -> resistance matrices."""
+
+
+def _uniform_drops(sides: ContactSides, _: Floats, flows: Floats) -> Floats:
+    """Temperature drops that are uniform over the contact."""
+    return sides.resistances * flows[:, 0]
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,8 @@ class Variant:
         (sides, conductivity of each particle, modes) -> Elements.
     potentials : callable
         (sides, conductivity, flows of shape (s, modes)) -> contact temperatures above the particle's mean, shape (s,).
+    drops : callable
+        (sides, conductivity, flows) -> mean temperature of each contact above that of the face of the side, shape (s,).
     modes : int
         Flux modes of a contact, unless others are asked for; a variant with 1 has no more. On the disk between two
         spheres ``modes`` stands for all modes of a degree below it.
@@ -56,6 +63,7 @@ class Variant:
     resistances: MakeResistances | None = None
     most: int = 10
     count: Callable[[int], int] = int
+    drops: Callable[[ContactSides, Floats, Floats], Floats] = _uniform_drops
 
 
 def _elements_of(make: MakeResistances, sides: ContactSides, conductivity: Floats, modes: int) -> Elements:
@@ -89,7 +97,9 @@ METHODS: Mapping[str, Variant] = {
         uniform_flux=False,
         resistances=arc_resistances,
     ),
-    "exact": Variant(exact_elements, exact_potentials, exact.MODES, uniform_flux=False, exact_cuts=True),
+    "exact": Variant(
+        exact_elements, exact_potentials, exact.MODES, uniform_flux=False, exact_cuts=True, drops=exact_drops
+    ),
 }
 METHODS_BY_DIMENSION: Mapping[int, Mapping[str, Variant]] = {
     2: METHODS,

@@ -16,6 +16,8 @@ a straight row, about sin^4(alpha)/500 is left.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numba import njit
 
@@ -23,6 +25,7 @@ from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.element import DiskContacts, disk_contacts
 from etc_engine.engines.dtem.sphere_error import sphere_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution
+from etc_engine.engines.dtem.uneven_film import uneven_film
 from etc_engine.errors import InputError
 from etc_engine.medium.sides import ContactSides
 
@@ -31,7 +34,8 @@ COEFFICIENTS = (0.706, -0.070, 1.288)
 ALLOWANCE = 0.25
 """Part of the single terms added to their sum, for what the fit leaves."""
 
-
+FILM_ALLOWANCE: Mapping[int, float] = {2: 0.1, 3: 0.25}
+"""Part of the excess resistance of a film added for what its law leaves, by the dimension."""
 LEAST = 0.002
 """What sin^4 alpha is multiplied with, averaged over the contacts with their heat flows."""
 
@@ -68,7 +72,8 @@ def _slope_term(sides: ContactSides, kappa: Floats, slopes: Floats) -> float:
 def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     """Estimated relative error of the conductivity by method ``chord``, in magnitude.
 
-    |s + m - j| + (|s| + |m| + |j|)/4 + <sin^4 alpha>/500 with s = c_S S/E, m = c_M M/E, j = c_J J/E.
+    |s + m - j| + (|s| + |m| + |j|)/4 + <sin^4 alpha>/500 with s = c_S S/E, m = c_M M/E, j = c_J J/E, and what a
+    resistance of contacts leaves (`film_error`).
 
     Parameters
     ----------
@@ -105,13 +110,34 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     """
     if solution.method != "chord":
         raise InputError(f"the error is estimated for method chord, found a solution by {solution.method}")
+    film = film_error(solution, load)
     if solution.sides.dimension == 3:
         kappa, energy = solution.medium.conductivity, float(solution.energies[load, load])
-        return sphere_error_estimate(solution.sides, kappa, solution.heat_flows[:, load], energy)
+        return film + sphere_error_estimate(solution.sides, kappa, solution.heat_flows[:, load], energy)
     parts = np.multiply(COEFFICIENTS, chord_error_terms(solution, load)) * [1.0, 1.0, -1.0]
     flows = np.abs(solution.heat_flows[:, load])
     rest = LEAST * (flows * np.sin(solution.sides.alpha) ** 4).sum() / max(float(flows.sum()), np.finfo(float).tiny)
-    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest)
+    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest + film)
+
+
+def film_error(solution: SteadySolution, load: int = 0) -> float:
+    """Estimated relative error of the conductivity by what the temperature jumps of contacts are taken to be.
+
+    A resistance given as one number is taken as uniform over the contact. A real interface of that resistance has the
+    excess D_R (`etc_engine.engines.dtem.uneven_film.uneven_film`), and conducts less by sum Q^2 D_R/E. The excess of a
+    resistance over the area is in the solution. `FILM_ALLOWANCE` of both is added.
+
+    Parameters
+    ----------
+    solution : SteadySolution
+    load : int
+    """
+    sides, kappa, energy = solution.sides, solution.medium.conductivity, float(solution.energies[load, load])
+    if energy == 0.0:
+        return 0.0
+    included, whole = uneven_film(sides, kappa), uneven_film(sides, kappa, lumped=True)
+    left = np.maximum(whole - included, 0.0) + FILM_ALLOWANCE[sides.dimension] * whole
+    return float((solution.heat_flows[:, load] ** 2 * left).sum() / energy)
 
 
 @njit(cache=True)

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from etc_engine.engines.dtem.exact.lune import (
     WAVES,
     ChordPoints,
+    FluxModes,
     centre_constant,
-    mode_transforms,
-    mode_weights,
+    chord_transforms,
+    chord_weights,
     own_resistances,
 )
 
@@ -172,9 +173,8 @@ def solve_in_place(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
 def solve_cut_disk(
     theta: NDArray[np.float64],
     alpha: NDArray[np.float64],
-    exponents: NDArray[np.float64],
+    fluxes: FluxModes,
     level: NDArray[np.int64],
-    modes: int,
     points: ChordPoints,
     h: NDArray[np.float64],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
@@ -183,7 +183,7 @@ def solve_cut_disk(
     Returns the offsets of each chord's points, the smooth densities g at them, and the strengths of the point
     sources that stand for phi + g away from their own chord, both of shape (points, chords * modes).
     """
-    chords = theta.size
+    chords, modes = theta.size, fluxes.profiles.shape[1]
     offsets = np.zeros(chords + 1, dtype=np.int64)
     for i in range(chords):
         offsets[i + 1] = offsets[i] + points.counts[level[i]]
@@ -196,7 +196,7 @@ def solve_cut_disk(
     weight = np.empty((modes, points.s.shape[1]))
     for j in range(chords):
         v, count = level[j], offsets[j + 1] - offsets[j]
-        mode_weights(exponents[j], v, points, weight[:, :count])
+        chord_weights(fluxes, j, v, points, weight[:, :count])
         for m in range(count):
             for k in range(modes):
                 of_modes[offsets[j] + m, j * modes + k] = weight[k, m]
@@ -212,7 +212,7 @@ def solve_cut_disk(
     for j in range(chords):
         for m in range(offsets[j], offsets[j + 1]):
             strengths[m] += points.weights[level[j], m - offsets[j]] * densities[m]
-    _own_parts(alpha, exponents, level, offsets, modes, points, densities, h)
+    _own_parts(alpha, fluxes, level, offsets, points, densities, h)
     for i in range(chords):
         for m in range(offsets[i], offsets[i + 1]):
             for n in range(total):
@@ -227,21 +227,21 @@ def solve_cut_disk(
 @njit(cache=True)
 def _own_parts(
     alpha: NDArray[np.float64],
-    exponents: NDArray[np.float64],
+    fluxes: FluxModes,
     level: NDArray[np.int64],
     offsets: NDArray[np.int64],
-    modes: int,
     points: ChordPoints,
     densities: NDArray[np.float64],
     h: NDArray[np.float64],
 ) -> None:
     """Part of kappa H that the densities of a chord cause on that chord itself."""
+    modes = fluxes.profiles.shape[1]
     transforms = np.empty((modes, WAVES))
     between, towards = np.empty((modes, modes)), np.empty((modes, points.s.shape[1]))
     h[:] = 0.0
     for i in range(alpha.size):
         v, count = level[i], offsets[i + 1] - offsets[i]
-        mode_transforms(exponents[i], transforms)
+        chord_transforms(fluxes, i, transforms)
         own_resistances(alpha[i], v, points, transforms, between, towards)
         for k in range(modes):
             for l in range(modes):

@@ -19,7 +19,8 @@ from numba import njit
 from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.engines.dtem.element import Elements, condense, packed_starts, refuse_indefinite
 from etc_engine.engines.dtem.exact.cut_disk import potentials_at, solve_cut_disk
-from etc_engine.engines.dtem.exact.lune import LEVELS, ChordPoints, chord_points
+from etc_engine.engines.dtem.exact.film import Film, contact_film
+from etc_engine.engines.dtem.exact.lune import LEVELS, ChordPoints, FluxModes, chord_points
 from etc_engine.errors import GeometryError
 from etc_engine.laws.disk import position_angles
 from etc_engine.medium.sides import ContactSides, refuse_overlap
@@ -50,6 +51,10 @@ class Chords(NamedTuple):
         Row of `etc_engine.engines.dtem.exact.lune.LEVELS`.
     signs : ndarray, shape (c,)
         Sign of odd modes.
+    nodes : ndarray of int, shape (c,)
+        Contact of each chord; any at an insulated one.
+    film : Film
+        What contacts resist.
     """
 
     offsets: Ints
@@ -59,6 +64,8 @@ class Chords(NamedTuple):
     exponents: Floats
     levels: Ints
     signs: Floats
+    nodes: Ints
+    film: Film
 
 
 def exact_elements(sides: ContactSides, conductivity: Floats, modes: int = MODES) -> Elements:
@@ -67,8 +74,9 @@ def exact_elements(sides: ContactSides, conductivity: Floats, modes: int = MODES
     Parameters
     ----------
     sides : ContactSides
-        With ``cuts``, chords that nothing passes. A contact resistance acts on mode 0 alone: its temperature jump is
-        taken as uniform over the contact.
+        With ``cuts``, chords that nothing passes. The temperature jump of a resistance over the contact area follows
+        the flux along the contact. That of a resistance given as one number is uniform over it: it acts on mode 0
+        alone.
     conductivity : ndarray, shape (n,) [W/(m K)]
     modes : int
 
@@ -93,7 +101,6 @@ def exact_elements(sides: ContactSides, conductivity: Floats, modes: int = MODES
     bad = _fill(
         sides.offsets,
         chords,
-        sides.resistances,
         conductivity,
         modes,
         starts,
@@ -119,13 +126,18 @@ def exact_potentials(sides: ContactSides, conductivity: Floats, flows: Floats) -
     chords, on_arc = chords_of_field(sides, conductivity, flows)
     return _potentials(
         chords,
-        sides.resistances,
         conductivity,
         np.ascontiguousarray(flows),
         sides.offsets,
         on_arc,
         chord_points(chords.levels),
     )
+
+
+def exact_drops(sides: ContactSides, conductivity: Floats, flows: Floats) -> Floats:
+    """Weighted mean temperature of every contact above that of the side's face, shape (s,), of flows (s, modes)."""
+    film = contact_film(sides, conductivity, edge_exponents(sides, conductivity), flows.shape[1])
+    return np.asarray(np.einsum("sm,sm->s", film.blocks[:, 0], flows))
 
 
 def chords_of_field(sides: ContactSides, conductivity: Floats, flows: Floats) -> tuple[Chords, Floats]:
@@ -157,11 +169,14 @@ def cut_chords(
     arms = np.concatenate([sides.arms[kept], cuts.arms])[order]
     theta = position_angles(arms)
     alpha = np.concatenate([sides.alpha[kept], cuts.alpha])[order]
-    exponents = np.concatenate([edge_exponents(sides, conductivity)[kept], np.ones(cuts.particles.size)])[order]
+    at_contacts = edge_exponents(sides, conductivity)
+    exponents = np.concatenate([at_contacts[kept], np.ones(cuts.particles.size)])[order]
     signs = np.concatenate([sides.mode_signs[kept], np.ones(cuts.particles.size)])[order]
     refuse_overlap(offsets, arms, alpha)
     levels = _choose_levels(offsets, theta, alpha, modes)
-    return Chords(offsets, rows, theta, alpha, exponents, levels, signs)
+    nodes = np.concatenate([sides.nodes[kept], np.zeros(cuts.particles.size, dtype=np.int64)])[order]
+    film = contact_film(sides, conductivity, at_contacts, modes)
+    return Chords(offsets, rows, theta, alpha, exponents, levels, signs, nodes, film)
 
 
 def edge_exponents(sides: ContactSides, conductivity: Floats) -> Floats:
@@ -224,7 +239,6 @@ def _clearances(offsets: Ints, theta: Floats, alpha: Floats) -> Floats:
 def _fill(
     side_offsets: Ints,
     chords: Chords,
-    resistance: Floats,
     conductivity: Floats,
     modes: int,
     starts: Ints,
@@ -239,14 +253,14 @@ def _fill(
             continue
         every = (chords.offsets[p + 1] - first) * modes
         h = np.empty((every, every))  # the chords of contacts come before those of insulated walls
-        solve_cut_disk(*of_disk(chords, p), modes, points, h)
+        solve_cut_disk(*of_disk(chords, p), points, h)
         for a in range(contacts):
             for k in range(modes):
                 for b in range(contacts):
                     for l in range(modes):
                         sign = (chords.signs[first + a] if k % 2 else 1.0) * (chords.signs[first + b] if l % 2 else 1.0)
                         h[a * modes + k, b * modes + l] *= sign / conductivity[p]
-            h[a * modes, a * modes] += resistance[chords.rows[first + a]]
+            h[a * modes : (a + 1) * modes, a * modes : (a + 1) * modes] += chords.film.blocks[chords.rows[first + a]]
         work = np.empty((size, size))
         if not condense(h, size, modes, work, values[starts[p] : starts[p + 1]]):
             return p
@@ -256,7 +270,6 @@ def _fill(
 @njit(cache=True)
 def _potentials(
     chords: Chords,
-    resistance: Floats,
     conductivity: Floats,
     flows: Floats,
     side_offsets: Ints,
@@ -264,7 +277,7 @@ def _potentials(
     points: ChordPoints,
 ) -> Floats:
     modes = flows.shape[1]
-    potentials = np.zeros(resistance.size)
+    potentials = np.zeros(flows.shape[0])
     for p in range(side_offsets.size - 1):
         first, count = chords.offsets[p], chords.offsets[p + 1] - chords.offsets[p]
         coefficients = np.zeros(count * modes)
@@ -275,12 +288,12 @@ def _potentials(
         if not np.any(coefficients):
             continue
         h = np.empty((count * modes, count * modes))
-        theta, alpha, exponents, levels = of_disk(chords, p)
-        starts, _, strengths = solve_cut_disk(theta, alpha, exponents, levels, modes, points, h)
+        theta, alpha, fluxes, levels = of_disk(chords, p)
+        starts, _, strengths = solve_cut_disk(theta, alpha, fluxes, levels, points, h)
         means, sources = h @ coefficients, strengths @ coefficients
         for a in range(count):
             row = chords.rows[first + a]
-            potentials[row] = means[a * modes] + resistance[row] * flows[row, 0]
+            potentials[row] = means[a * modes] + (chords.film.blocks[row, 0] * flows[row]).sum()
         for side in range(side_offsets[p], side_offsets[p + 1]):
             if not np.isnan(arc_points[side]):
                 z = np.exp(1j * arc_points[side])
@@ -289,7 +302,10 @@ def _potentials(
 
 
 @njit(cache=True)
-def of_disk(chords: Chords, p: int) -> tuple[Floats, Floats, Floats, Ints]:
-    """Position angles, half-angles, exponents and levels of the chords of one disk."""
+def of_disk(chords: Chords, p: int) -> tuple[Floats, Floats, FluxModes, Ints]:
+    """Position angles, half-angles, flux modes and levels of the chords of one disk."""
     own = slice(chords.offsets[p], chords.offsets[p + 1])
-    return chords.theta[own], chords.alpha[own], chords.exponents[own], chords.levels[own]
+    profiles = chords.film.profiles
+    if profiles.shape[0] > 0:
+        profiles = profiles[chords.nodes[own]]
+    return chords.theta[own], chords.alpha[own], FluxModes(chords.exponents[own], profiles), chords.levels[own]

@@ -29,12 +29,11 @@ def loaded_waves(
                 coefficients[a, k] = (chords.signs[first + a] if k % 2 else 1.0) * flows[row, k] / conductivity
     if not np.any(coefficients):
         return False, np.zeros((0, 2, 1)), np.zeros((0, 2)), np.zeros(0)
-    _, alpha, exponents, levels = of_disk(chords, p)
-    theta = chords.theta[first : first + count]
+    theta, alpha, fluxes, levels = of_disk(chords, p)
     h = np.empty((count * modes, count * modes))
-    offsets, densities, _ = solve_cut_disk(theta, alpha, exponents, levels, modes, points, h)
+    offsets, densities, _ = solve_cut_disk(theta, alpha, fluxes, levels, points, h)
     load = coefficients.ravel()
-    transforms, constants = chord_waves(alpha, exponents, levels, offsets, densities @ load, coefficients, points)
+    transforms, constants = chord_waves(alpha, fluxes, levels, offsets, densities @ load, coefficients, points)
     return True, transforms, constants, h @ load
 
 

@@ -1,7 +1,8 @@
 r"""How far the temperatures of ``exact`` are from continuous, and what it costs in energy to make them so.
 
 The fluxes of the method balance in every disk and across every contact; its temperatures T_p, harmonic in every
-disk, agree across a contact in the mean over every flux mode, but jump by J(s) in between. Take half of the jump
+disk, agree across a contact in the mean over every flux mode, but jump by J(s) in between: beyond r q(s), where the
+contact resists over its area. Take half of the jump
 away on either side (all of it at a wall) by adding to T_p a field v_p with those values on the chords of p. The
 result is continuous, and its energy is
 
@@ -13,6 +14,9 @@ bound; the one taken here, in the strip x + i y of each chord (see `etc_engine.e
     v = J(x) (1 - a(x) min(y/Y, 1)),
 
 with Y so small, and a = 1 up to |x| so large, that it vanishes on the other contact chords.
+
+A resistance over the area may take the jump instead of v_p: with r_p the part of r on either side (all of it at a
+wall), int J^2/r_p over the contact, J being the part of the jump on that side. The cheaper of the two counts.
 """
 
 from __future__ import annotations
@@ -24,11 +28,13 @@ from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.exact.cut_disk import chord_point
 from etc_engine.engines.dtem.exact.element import Chords, cut_chords, of_disk
 from etc_engine.engines.dtem.exact.field import loaded_waves
-from etc_engine.engines.dtem.exact.lune import ChordPoints, chord_points
+from etc_engine.engines.dtem.exact.film import flux_densities
+from etc_engine.engines.dtem.exact.lune import PROFILE_STEP, ChordPoints, chord_points
 from etc_engine.engines.dtem.exact.waves import chord_trace
 from etc_engine.engines.dtem.steady import SteadySolution
+from etc_engine.medium.sides import ContactSides
 
-STEP = 0.4
+STEP = PROFILE_STEP
 """Step along chi; the jump and its fourth-order differences are smooth at the scale 1/modes."""
 REACH = 50
 """Points on either side, up to chi = 20, where the jump is constant to 1e-5 of itself."""
@@ -53,13 +59,28 @@ def jump_energies(solution: SteadySolution, load: int = 0) -> Floats:
     deviations = np.zeros((sides.nodes.size, chi.size))
     flows = np.ascontiguousarray(solution.flows[:, :, load])
     _deviations(chords, kappa, flows, chi, chord_points(chords.levels), deviations)
+    films = np.where(sides.area_resistances > 0.0, sides.area_resistances / sides.reaches, 0.0)
+    if chords.film.profiles.size:
+        deviations += films[:, None] * _densities(chords, sides, flows)
+        deviations -= np.einsum("sm,sm->s", chords.film.blocks[:, 0], flows)[:, None]
+        deviations += (sides.lumped_resistances * flows[:, 0])[:, None]
     jumps = deviations.copy()
     first, second = sides.of_contacts.T
     jumps[first] = 0.5 * (deviations[first] - deviations[second, ::-1])
     jumps[second] = 0.5 * (deviations[second] - deviations[first, ::-1])
     slopes = np.zeros_like(jumps)
     slopes[:, 2:-2] = (8.0 * (jumps[:, 3:-1] - jumps[:, 1:-3]) - jumps[:, 4:] + jumps[:, :-4]) / (12.0 * STEP)
-    return _extension_energies(chords, kappa, chi, jumps, slopes)
+    return _extension_energies(chords, kappa, chi, jumps, slopes, films)
+
+
+def _densities(chords: Chords, sides: ContactSides, flows: Floats) -> Floats:
+    """Flux per unit s into the particle along every contact side, at the points of the jumps, shape (s, points)."""
+    half = flux_densities(chords.film.profiles)[sides.nodes, :, : REACH + 1]
+    odd = np.arange(flows.shape[1]) % 2 == 1
+    coefficients = flows * np.where(odd, sides.mode_signs[:, None], 1.0)
+    even_part = np.einsum("sm,smx->sx", np.where(odd, 0.0, coefficients), half)
+    odd_part = np.einsum("sm,smx->sx", np.where(odd, coefficients, 0.0), half)
+    return np.concatenate([(even_part - odd_part)[:, :0:-1], even_part + odd_part], axis=1)
 
 
 @njit(cache=True)
@@ -93,17 +114,28 @@ def _extension_energies(
     chi: Floats,
     jumps: Floats,
     slopes: Floats,
+    films: Floats,
 ) -> Floats:
-    """Energy of an extension of all jumps of each particle, (sum of the roots of one at a time) squared."""
+    """Energy of an extension of all jumps of each particle, (sum of the roots of one at a time) squared.
+
+    Where a contact resists over its area and that is cheaper, the energy of the jump in the resistance, r_p/c.
+    """
     energies = np.zeros(chords.offsets.size - 1)
     for p in range(energies.size):
-        total = 0.0
+        total, in_films = 0.0, 0.0
         for a in range(chords.offsets[p], chords.offsets[p + 1]):
             row = chords.rows[a]
             if row >= 0:
                 reach, depth = _free_strip(chords, p, a)
-                total += np.sqrt(_least_extension(np.pi - chords.alpha[a], reach, depth, chi, jumps[row], slopes[row]))
-        energies[p] = conductivity[p] * total**2
+                energy = _least_extension(np.pi - chords.alpha[a], reach, depth, chi, jumps[row], slopes[row])
+                film = np.inf
+                if films[row] > 0.0:
+                    film = 0.5 * STEP * (jumps[row] ** 2 / np.cosh(0.5 * chi) ** 2).sum() / films[row]
+                if film < conductivity[p] * energy:
+                    in_films += film
+                else:
+                    total += np.sqrt(energy)
+        energies[p] = conductivity[p] * total**2 + in_films
     return energies
 
 

@@ -37,6 +37,11 @@ CHI_STEP = 0.5
 CHI_POINTS = 144
 """Points on the half-line chi > 0, up to 72."""
 
+PROFILE_STEP = 0.4
+"""Step over chi of flux modes that are given by values."""
+PROFILE_POINTS = 71
+"""Points of such a mode on chi >= 0, up to 28, where exp(-chi/2) is below 1e-6."""
+
 LEVELS = (
     (0.5, 20),
     (0.1, 28),
@@ -51,6 +56,22 @@ LEVELS = (
     (1e-6, 180),
 )
 """Clearance a set of points is made for, the distance of a neighbouring corner in half-chords, and their number."""
+
+
+class FluxModes(NamedTuple):
+    """Flux modes of the chords of one disk.
+
+    Parameters
+    ----------
+    exponents : ndarray, shape (chords,)
+        b of Gegenbauer modes.
+    profiles : ndarray, shape (chords, M, PROFILE_POINTS)
+        Instead of these, flux per unit chi times the weight of each point chi >= 0 (see
+        `etc_engine.engines.dtem.exact.film`); no rows where Gegenbauer modes hold.
+    """
+
+    exponents: Floats
+    profiles: Floats
 
 
 class ChordPoints(NamedTuple):
@@ -69,6 +90,8 @@ class ChordPoints(NamedTuple):
     cosines, sines : ndarray, shape (levels, waves, points)
         Fourier transform over chi, as C - i S, of the density that interpolates 1 at one point and 0 at the rest.
     waves : ndarray, shape (waves,)
+    legendre : ndarray, shape (levels, points, PROFILE_POINTS)
+        P_l(xi) at the points chi >= 0 of flux modes that are given by values.
     """
 
     counts: Ints
@@ -80,6 +103,7 @@ class ChordPoints(NamedTuple):
     cosines: Floats
     sines: Floats
     waves: Floats
+    legendre: Floats
 
 
 def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
@@ -88,6 +112,8 @@ def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
     waves = np.linspace(0.5, SINK_WAVES - 0.5, SINK_WAVES) * WAVE_STEP
     flat = np.zeros((4, levels, widest))
     products = np.zeros((levels, widest, widest))
+    legendre = np.zeros((levels, widest, PROFILE_POINTS))
+    profile = np.tanh(0.5 * PROFILE_STEP * np.arange(PROFILE_POINTS))
     transforms = np.zeros((2, levels, SINK_WAVES, widest))
     step = 0.5 * CHI_STEP
     chi = np.arange(-CHI_POINTS, CHI_POINTS + 1) * step
@@ -101,6 +127,8 @@ def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
         degree = np.arange(points)
         product = (degree + 0.5) * w[:, None] * np.polynomial.legendre.legvander(xi, points - 1)
         products[level, :points, :points] = product
+        at_profile = np.minimum(np.arctanh(profile * np.tanh(stretch)) / stretch, 1.0)
+        legendre[level, :points] = np.polynomial.legendre.legvander(at_profile, points - 1).T
         position = np.tanh(0.5 * chi)
         at = np.polynomial.legendre.legvander(np.arctanh(position * np.tanh(stretch)) / stretch, points - 1)
         densities = (
@@ -111,7 +139,9 @@ def chord_points(used: Iterable[int] = range(len(LEVELS))) -> ChordPoints:
         ):  # einsum: no threaded product, the same bits anywhere
             transforms[part, level, :, :points] = np.einsum("kx,xm->km", wave, densities, optimize=False)
     counts = np.array([points for _, points in LEVELS])
-    return ChordPoints(counts, flat[0], flat[1], flat[2], flat[3], products, transforms[0], transforms[1], waves)
+    return ChordPoints(
+        counts, flat[0], flat[1], flat[2], flat[3], products, transforms[0], transforms[1], waves, legendre
+    )
 
 
 @njit(cache=True)
@@ -169,6 +199,41 @@ def mode_weights(
         mode_values(s[m], b, values)
         for k in range(out.shape[0]):
             out[k, m] = weight * values[k]
+
+
+@njit(cache=True)
+def chord_weights(fluxes: FluxModes, chord: int, level: int, points: ChordPoints, out: Floats) -> None:
+    """Weights of the points that integrate a smooth function against the flux modes of a chord, (M, points)."""
+    if fluxes.profiles.shape[0] == 0:
+        mode_weights(fluxes.exponents[chord], level, points, out)
+        return
+    profile, products, legendre = fluxes.profiles[chord], points.products[level], points.legendre[level]
+    out[:] = 0.0
+    for k in range(out.shape[0]):
+        for l in range(k % 2, out.shape[1], 2):
+            moment = 0.0
+            for x in range(PROFILE_POINTS):
+                moment += profile[k, x] * legendre[l, x]
+            for m in range(out.shape[1]):
+                out[k, m] += products[m, l] * moment
+
+
+@njit(cache=True)
+def chord_transforms(fluxes: FluxModes, chord: int, out: Floats) -> None:
+    """Fourier transforms over chi of the flux modes of a chord, (M, waves): cosine even ones, sine odd ones."""
+    if fluxes.profiles.shape[0] == 0:
+        mode_transforms(fluxes.exponents[chord], out)
+        return
+    profile = fluxes.profiles[chord]
+    out[:] = 0.0
+    for x in range(PROFILE_POINTS):
+        chi = x * PROFILE_STEP
+        turn = np.exp(1j * WAVE_STEP * chi)
+        wave = np.exp(0.5j * WAVE_STEP * chi)
+        for n in range(out.shape[1]):
+            for k in range(out.shape[0]):
+                out[k, n] += profile[k, x] * (wave.imag if k % 2 else wave.real)
+            wave *= turn
 
 
 @njit(cache=True)

@@ -21,6 +21,7 @@ from etc_engine.engines.dtem.element import (
     packed_starts,
     refuse_indefinite,
 )
+from etc_engine.engines.dtem.uneven_film import uneven_film
 from etc_engine.errors import GeometryError
 from etc_engine.laws.sphere import FOUR_PI
 from etc_engine.laws.sphere_modes import (
@@ -72,7 +73,8 @@ def exact_sphere_elements(sides: ContactSides, conductivity: Floats, modes: int)
     ----------
     sides : ContactSides
         With ``cuts``, disks that nothing passes. A contact resistance acts on mode 0 alone: its temperature jump is
-        taken as uniform over the contact.
+        taken as uniform over the contact. One over the contact area has the excess of
+        `etc_engine.engines.dtem.uneven_film.uneven_film` added: the modes of spheres do not resolve it.
     conductivity : ndarray, shape (n,) [W/(m K)]
     modes : int
         (degree + 1)(degree + 2)/2 for the modes m + 2k <= degree.
@@ -109,7 +111,7 @@ def exact_sphere_elements(sides: ContactSides, conductivity: Floats, modes: int)
         tables,
         own_blocks(tables, alpha),
         np.ascontiguousarray(conductivity * sides.radii),
-        sides.resistances,
+        sides.resistances + uneven_film(sides, conductivity),
         starts,
         values,
     )
@@ -143,7 +145,7 @@ def exact_sphere_potentials(sides: ContactSides, conductivity: Floats, flows: Fl
         np.ascontiguousarray(flows),
         potentials,
     )
-    return potentials + sides.resistances * flows[:, 0]
+    return potentials + (sides.resistances + uneven_film(sides, conductivity)) * flows[:, 0]
 
 
 def _degree(modes: int) -> int:

@@ -21,8 +21,9 @@ from etc_engine.engines.dtem.exact.lune import (
     WAVE_STEP,
     WAVES,
     ChordPoints,
+    FluxModes,
     centre_constant,
-    mode_transforms,
+    chord_transforms,
     strip_symbols,
 )
 
@@ -30,7 +31,7 @@ from etc_engine.engines.dtem.exact.lune import (
 @njit(cache=True)
 def chord_waves(
     alpha: Floats,
-    exponents: Floats,
+    fluxes: FluxModes,
     levels: Ints,
     offsets: Ints,
     densities: Floats,
@@ -50,7 +51,7 @@ def chord_waves(
     for i in range(alpha.size):
         v = levels[i]
         if np.any(coefficients[i]):
-            mode_transforms(exponents[i], of_modes)
+            chord_transforms(fluxes, i, of_modes)
             for k in range(modes):
                 transforms[i, k % 2, :WAVES] += coefficients[i, k] * of_modes[k]
         net = coefficients[i, 0]
