@@ -207,11 +207,11 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
         )
     bound = "whole cells" if comparison.attrs["pores_conduct"] else "overlapping particles"
     if not comparison.attrs["bounds_bind"]:
-        click.echo(f"bounds: a comparison only, they do not bind: {comparison.attrs['bounds_unbound']}")
+        click.echo(f"bounds: only a comparison here: {comparison.attrs['bounds_unbound']}")
     elif comparison.attrs["bound_broken"]:
-        click.echo(f"bounds: they bind {bound}, and are broken")
+        click.echo(f"bounds: they hold for {bound}, and are broken")
     else:
-        click.echo(f"bounds: they bind {bound}, and every mean and realization keeps them")
+        click.echo(f"bounds: they hold for {bound}, and no mean or realization breaks them")
     for line in closest_words(comparison):
         click.echo(line)
 

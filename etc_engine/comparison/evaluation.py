@@ -1,4 +1,4 @@
-"""Closed-form models on the dimensions of a sweep, their differences, and the bounds that bind."""
+"""Closed-form models on the dimensions of a sweep, their differences, and the bounds that apply."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
     xarray.Dataset
         On ``model`` and the dimensions of the sweep: ``model_conductivity`` [W/(m K)],
         ``relative_difference`` (model - simulation)/simulation, ``outside_bound`` (the simulation lies beyond
-        this bound) and ``bound_broken`` (and the bound binds this geometry). Without ``model``: the simulated
+        this bound) and ``bound_broken`` (and the bound applies to this geometry). Without ``model``: the simulated
         conductivity with its interval (see `etc_engine.comparison.simulation.simulated`), ``inside_bounds``,
         ``realizations_outside_bounds``. Over the densities: ``rms_relative_difference`` and ``best_model``,
         among estimates. Coordinates ``model_kind``, ``model_title``, ``model_note`` (why a value is
@@ -98,8 +98,8 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
     Hashin-Shtrikman. The contact mean field is the sweep's own, on the networks it solved; it takes the pipe resistance
     of the ``chord`` method whatever the method.
 
-    The bounds bind a body whose two phases are what the solid fraction says: overlapping particles, and whole cells
-    with pores that conduct (there beyond the interval of the mean and the estimated error of the discretization). A
+    The bounds apply to a body of two phases whose volumes the solid fraction gives: overlapping particles, and whole
+    cells with pores that conduct (there beyond the interval of the mean and the estimated error of the discretization). A
     bonded contact conducts through a neck that the solid fraction does not count: for it the bounds are a comparison.
     The Hashin-Shtrikman bounds are for the mean over isotropic ensembles. Every single realization and direction is
     compared with the Wiener bounds (series, parallel) of its own solid fraction, which need no isotropy.
@@ -356,8 +356,8 @@ _MEANINGS = {
     "relative_difference": ("relative difference of the model to the simulation", "1"),
     "rms_relative_difference": ("root mean square relative difference over the densities", "1"),
     "outside_bound": ("the simulation lies beyond this bound", "1"),
-    "bound_broken": ("the simulation lies beyond this bound, which binds its geometry", "1"),
+    "bound_broken": ("the simulation lies beyond this bound, which applies to its geometry", "1"),
     "inside_bounds": ("the simulation lies inside the bounds of isotropic two-phase media", "1"),
     "realizations_outside_bounds": ("realizations beyond the Wiener bounds of their own solid fraction", "1"),
-    "best_model": ("estimate of the smallest root mean square relative difference, where the band tells it", "1"),
+    "best_model": ("estimate of the smallest root mean square relative difference, where the band determines it", "1"),
 }

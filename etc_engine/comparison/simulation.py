@@ -30,7 +30,7 @@ class Phases:
     dimension : int
         2 for disks, 3 for spheres.
     unbound : str
-        Why the rigorous bounds do not bind; empty if they do. They bind the union of the particles, whose solid
+        Why the rigorous bounds do not apply; empty if they do. They apply to the union of the particles, whose solid
         fraction is known.
     """
 
@@ -41,7 +41,7 @@ class Phases:
 
     @property
     def bounds_bind(self) -> bool:
-        """Whether the rigorous bounds bind the simulated body."""
+        """Whether the rigorous bounds apply to the simulated body."""
         return not self.unbound
 
     @property
@@ -117,7 +117,7 @@ def phases(dataset: xarray.Dataset) -> Phases:
 
 
 def _unbound(rule: str, *, gas: bool, glow: bool) -> str:
-    """Why the bounds of two phases of known volume do not bind, or an empty text."""
+    """Why the bounds of two phases of known volume do not apply, or an empty text."""
     if glow:
         return "radiation crosses the pores beside what fills them"
     if gas:

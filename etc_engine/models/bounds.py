@@ -90,7 +90,7 @@ def hashin_shtrikman_lower(k1: Floats, k2: Floats, fraction: Floats, *, dimensio
     Notes
     -----
     The better conductor sits as disks or spheres in the worse: Maxwell's formula when k2 > k1. It is 0 as
-    soon as one phase insulates. It binds media that fill the plane or space with the two phases; a network
+    soon as one phase insulates. It holds for media that fill the plane or space with the two phases; a network
     of bonded contacts is not such a medium.
 
     References

@@ -117,7 +117,7 @@ def _facts(dataset: xarray.Dataset, comparison: xarray.Dataset, study: Mapping[s
         "particles of a realization": _number(float(particles.mean()), ".0f"),
         "realizations of a cell": _range(dataset["count"].values.ravel().tolist()),
         "failed cells": str(failed),
-        "rigorous bounds": f"do not bind: {unbound}" if unbound else bound,
+        "rigorous bounds": f"do not apply: {unbound}" if unbound else bound,
         "closest model": comparison.attrs["best_model"]
         or f"not named: {comparison.attrs['best_model_note'] or 'none'}",
     }
@@ -209,9 +209,9 @@ def _models(comparison: xarray.Dataset) -> str:
     pores, particles = (in_words(comparison.attrs[f"{name}_conductivity"]) for name in ("pore", "particle"))
     bound = "whole cells" if comparison.attrs["pores_conduct"] else "overlapping particles"
     binding = (
-        f"The bounds bind {bound}: an asterisk is a result that breaks one."
+        f"The bounds hold for {bound}: an asterisk marks a result that breaks one."
         if comparison.attrs["bounds_bind"]
-        else f"The bounds are a comparison here, they do not bind: {comparison.attrs['bounds_unbound']}."
+        else f"The bounds are only a comparison here: {comparison.attrs['bounds_unbound']}."
     )
     text = (
         f"<p>Pores of {pores} W/(m K), particles of {particles} W/(m K), at the mean solid fraction. "

@@ -148,7 +148,7 @@ def _refuse_long_keys(text: str, source: str) -> None:
     >>> _refuse_long_keys("a = '1.2.3.4.5.6.7.8.9.10' # 1.2.3.4.5.6.7.8.9.10", "s.toml")
     >>> _refuse_long_keys("a.'b'.c.d.e.f.g.h.i = 1", "s.toml")
     Traceback (most recent call last):
-    etc_engine.errors.StudyError: s.toml: is not valid: line 1 has a key of more than 8 parts, a study has keys of 3 ...
+    etc_engine.errors.StudyError: s.toml: is not valid: line 1 has a key of more than 8 parts, keys of a study have ...
     """
     bare = OPAQUE.sub(lambda found: "" if found[0].startswith("#") else "s" + "\n" * found[0].count("\n"), text)
     found = LONG_KEY.search(bare)
@@ -156,7 +156,7 @@ def _refuse_long_keys(text: str, source: str) -> None:
         line = bare.count("\n", 0, found.start()) + 1
         raise StudyError(
             f"{source}: is not valid: line {line} has a key of more than {MOST_PARTS} parts, "
-            "a study has keys of 3 at most"
+            "keys of a study have at most 3"
         )
 
 

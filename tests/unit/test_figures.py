@@ -96,7 +96,7 @@ def test_curves_are_the_means_and_bands_their_intervals(made_sweep):
         assert band[:, 1].min() == pytest.approx(float(cell["conductivity_ci_low"].min()))
         assert band[:, 1].max() == pytest.approx(float(cell["conductivity_ci_high"].max()))
     assert "W m" in panel.get_ylabel()
-    assert any("bounds do not bind:\nthe contacts are bonds" in t.get_text() for t in figure.texts)
+    assert any("bounds do not apply:\nthe contacts are bonds" in t.get_text() for t in figure.texts)
 
 
 def test_the_axes_follow_the_sweep(made_sweep):

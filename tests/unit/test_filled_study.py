@@ -189,7 +189,7 @@ def test_a_sweep_compares_each_conductivity_with_models_of_its_own(etc_engine, t
     shown = etc_engine("compare", out, "-o", tmp_path / "figure.png")
     assert shown.returncode == 0
     assert "particles of 1, 5 W/(m K), pores of 0.5 W/(m K)" in shown.stdout
-    assert "they bind whole cells" in shown.stdout
+    assert "they hold for whole cells" in shown.stdout
     assert etc_engine("report", out, "-o", tmp_path / "report.html").returncode == 0
     assert "Pores of 0.5 W/(m K), particles of 1, 5 W/(m K)" in (tmp_path / "report.html").read_text()
 

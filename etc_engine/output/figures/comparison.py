@@ -32,7 +32,7 @@ DECADES = 1.3
 
 MOST_PANELS = 12
 
-BOUNDS_NOTE = "Hashin-Shtrikman bounds bind overlapping particles"
+BOUNDS_NOTE = "Hashin-Shtrikman bounds hold for overlapping particles"
 
 SHORT = {
     "series": "series",
@@ -299,14 +299,14 @@ def _notes(comparison: xarray.Dataset) -> str:
     mean = f"the mean of {diagonal}"
     notes = [f"Bands: {100 * level:g} % Student-t interval of {mean}, {number} realizations."]
     if bool(comparison["method_error"].notnull().any()):
-        notes.append("Wide pale bands: and the estimated error of the method, of the discretization too.")
+        notes.append("Wide pale bands add the estimated error of method and discretization.")
     zero = [
         SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
     ]
     if zero and not comparison.attrs["pores_conduct"]:
         notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
     if comparison.attrs["bounds_unbound"]:
-        notes.append(f"Hashin-Shtrikman bounds do not bind:\n{comparison.attrs['bounds_unbound']}.")
+        notes.append(f"Hashin-Shtrikman bounds do not apply:\n{comparison.attrs['bounds_unbound']}.")
     elif not comparison.attrs["pores_conduct"]:
         notes.append(f"{BOUNDS_NOTE}.")
     return "\n".join(notes)
