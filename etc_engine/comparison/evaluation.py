@@ -99,8 +99,8 @@ def evaluate_models(dataset: xarray.Dataset, models: Models | None = None) -> xa
     of the ``chord`` method whatever the method.
 
     The bounds apply to a body of two phases whose volumes the solid fraction gives: overlapping particles, and whole
-    cells with pores that conduct (there beyond the interval of the mean and the estimated error of the discretization). A
-    bonded contact conducts through a neck that the solid fraction does not count: for it the bounds are a comparison.
+    cells with pores that conduct (there beyond the interval of the mean and the estimated error of the discretization).
+    A bonded contact conducts through a neck that the solid fraction does not count: for it the bounds are a comparison.
     The Hashin-Shtrikman bounds are for the mean over isotropic ensembles. Every single realization and direction is
     compared with the Wiener bounds (series, parallel) of its own solid fraction, which need no isotropy.
     """
