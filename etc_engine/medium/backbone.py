@@ -137,11 +137,28 @@ def joined_axes(
     >>> joined_axes(disk, np.array([[0, 0]]), np.array([[1, 0]]), none, none)
     (0,)
     """
-    n, box = packing.count, packing.box
-    clusters, winding = join_clusters(n, pairs, shifts)
-    touches = np.zeros((n, 2 * box.dimension), dtype=np.bool_)
-    touches[clusters[wall_particles], walls] = True
-    spanning = np.where(box.periodic, winding, touches[:, 0::2] & touches[:, 1::2])
+    box = packing.box
+    return joined_nodes(packing.count, box.periodic, (pairs, shifts), (wall_particles, walls))
+
+
+def joined_nodes(
+    count: int,
+    periodic: tuple[bool, ...],
+    links: tuple[NDArray[np.int64], NDArray[np.int64]],
+    ends: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> tuple[int, ...]:
+    """The same of any nodes in a box: ``links`` are pairs and shifts, ``ends`` nodes at walls and the walls.
+
+    Examples
+    --------
+    >>> none = np.zeros(0, dtype=np.int64)
+    >>> joined_nodes(1, (True, True), (np.array([[0, 0]]), np.array([[0, 1]])), (none, none))
+    (1,)
+    """
+    clusters, winding = join_clusters(count, *links)
+    touches = np.zeros((count, 2 * len(periodic)), dtype=np.bool_)
+    touches[clusters[ends[0]], ends[1]] = True
+    spanning = np.where(periodic, winding, touches[:, 0::2] & touches[:, 1::2])
     return tuple(int(axis) for axis in np.flatnonzero(spanning.any(axis=0)))
 
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from etc_engine.arrays import Floats, Ints
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import GeometryError, InputError
+from etc_engine.medium.backbone import joined_nodes
 from etc_engine.medium.medium import Medium
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
@@ -89,6 +90,61 @@ def contrast(medium: Medium) -> tuple[float, float]:
 def count_overlaps(packing: ParticlePacking) -> int:
     """Number of pairs of particles that overlap by more than rounding, periodic images included."""
     return int((neighbor_pairs(packing).gaps < -ROUNDING * packing.radii.mean()).sum())
+
+
+def overlapping_axes(packing: ParticlePacking, members: Flags, periodic: tuple[bool, ...]) -> tuple[int, ...]:
+    """Axes along which some particles overlap all the way: around the box, or from wall to wall.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+    members : ndarray of bool, shape (n,)
+        The particles that count.
+    periodic : tuple of bool
+        Axes around which the box repeats; where the packing repeats and this does not, walls cut the particles.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> row = ParticlePacking([[0.25, 0.5], [0.75, 0.5]], [0.25, 0.26], Box((1.0, 1.0), (True, True)))
+    >>> every = np.ones(2, dtype=bool)
+    >>> overlapping_axes(row, every, (True, True)), overlapping_axes(row, every, (False, False))
+    ((0,), ())
+    """
+    box, slack = packing.box, ROUNDING * packing.radii.mean()
+    found = neighbor_pairs(packing)
+    cut = np.asarray(box.periodic) & ~np.asarray(periodic)
+    overlap = members[found.pairs].all(axis=1) & (found.gaps < -slack) & (found.shifts[:, cut] == 0).all(axis=1)
+    depth = np.stack((packing.centers, np.asarray(box.lengths) - packing.centers), axis=2)
+    reaching = (depth < packing.radii[:, None, None] - slack) & members[:, None, None]
+    nodes, walls = np.nonzero(reaching.reshape(packing.count, -1))
+    return joined_nodes(packing.count, periodic, (found.pairs[overlap], found.shifts[overlap]), (nodes, walls))
+
+
+def without_cut_axes(tensor: Floats, medium: Medium, boundary: str) -> Floats:
+    """A tensor with exact zeros where pores that insulate cut the conducting particles from each other.
+
+    Parameters
+    ----------
+    tensor : ndarray, shape (d, d) [W/(m K)]
+    medium : Medium
+    boundary : str
+        ``periodic`` or ``walls``.
+
+    Returns
+    -------
+    ndarray, shape (d, d) [W/(m K)]
+        The same where the pores conduct. Particles that touch at a point conduct nothing.
+    """
+    if medium.pores.conductivity > 0.0:
+        return tensor
+    d = medium.dimension
+    joined = overlapping_axes(medium.packing, medium.conductivity > 0.0, (boundary == "periodic",) * d)
+    cut = np.setdiff1d(np.arange(d), joined)
+    found = tensor.copy()
+    found[cut, :] = np.where(np.isnan(found[cut, :]), np.nan, 0.0)
+    found[:, cut] = np.where(np.isnan(found[:, cut]), np.nan, 0.0)
+    return found
 
 
 def check_phases(medium: Medium) -> None:

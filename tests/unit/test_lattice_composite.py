@@ -143,6 +143,40 @@ def test_inclusions_apart_in_an_insulating_matrix_conduct_nothing(box):
     assert made.model_error == 0.0
 
 
+@pytest.mark.parametrize(
+    ("fraction", "contrast", "boundary", "particles"),
+    [
+        (0.5, 10.0, "periodic", 1200),
+        (0.5, 100.0, "periodic", 1200),
+        (0.4, 10.0, "walls", 1200),
+        (0.3, 0.01, "walls", 2500),
+    ],
+)
+def test_the_estimate_covers_gaps_that_the_lattice_does_not_resolve(fraction, contrast, boundary, particles):
+    """Gaps of a quarter to a whole seed spacing: a coarser lattice alone differed by .4 to .8 of the error."""
+    exact = float(simple_cubic(1.0, contrast, fraction))
+    medium = spheres(CENTRE, float(np.cbrt(0.75 * fraction / np.pi)), contrast)
+    made = homogenize_lattice(medium, rng=rng(), particles=particles, boundary=boundary)
+    error = np.abs(np.diag(made.tensor) / exact - 1.0).max()
+    assert error < made.model_error < 8.0 * error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("contrast", [10.0, 100.0])
+def test_the_estimate_covers_the_array_at_half_filling_with_5000_particles(contrast):
+    exact = float(simple_cubic(1.0, contrast, 0.5))
+    made = homogenize_lattice(spheres(CENTRE, float(np.cbrt(0.375 / np.pi)), contrast), rng=rng(), particles=5000)
+    error = np.abs(np.diag(made.tensor) / exact - 1.0).max()
+    assert error < made.model_error < 4.0 * error
+
+
+def test_spheres_that_touch_in_insulating_pores_conduct_nothing():
+    touching = Medium(ParticlePacking(CENTRE, [0.5], CUBE), 5.0, pores=Pores(0.0))
+    made = homogenize_lattice(touching, rng=rng(), particles=600)
+    assert np.diag(made.tensor).tolist() == [0.0] * 3
+    assert made.model_error == 0.0
+
+
 def test_the_contact_lattice_is_calibrated_on_itself():
     made = homogenize_lattice(spheres(CENTRE, 1 / 3, 1.0), rng=rng(), particles=1000, transmission="contact")
     np.testing.assert_allclose(np.diag(made.tensor), 1.0, rtol=1e-9)

@@ -102,3 +102,24 @@ def test_a_damaged_tiff_that_keeps_the_reader_busy_is_given_up(tmp_path, monkeyp
     monkeypatch.setattr(apart, "SECONDS", 2.0)
     with pytest.raises(InputError, match="read as TIFF: the reading library did not finish within 2"):
         read_image(path)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "walls"])
+@pytest.mark.parametrize("shape", [(2, 2), (8, 8), (2, 2, 2), (4, 4, 4)])
+def test_blocks_that_touch_in_corners_or_edges_alone_conduct_nothing(shape, boundary):
+    """A checkerboard of a conductor and an insulator; the scheme alone gives .5 .. .1, falling with log h."""
+    blocks = (np.indices(shape) // (shape[0] // 2)).sum(axis=0) % 2
+    solution, error = homogenize_image(blocks, {0: 0.0, 1: 1.0}, (1.0,) * len(shape), boundary=boundary)
+    assert np.diag(solution.tensor).tolist() == [0.0] * len(shape)
+    assert error == 0.0
+
+
+def test_an_axis_along_which_faces_join_keeps_its_conductivity():
+    """A layer of half the height beside blocks that touch it in corners: 1/2 along x, 0 along y."""
+    image = np.zeros((4, 4), dtype=int)
+    image[:, :2] = 1
+    image[0, 2] = 1
+    solution, _ = homogenize_image(image, {0: 0.0, 1: 1.0}, (1.0, 1.0))
+    assert 0.5 <= solution.tensor[0, 0] < 0.6
+    assert solution.tensor[1, 1] == 0.0
+    assert solution.tensor[0, 1] == 0.0

@@ -72,7 +72,12 @@ class _Pairs:
 
 
 def fitted_seeds(
-    packing: ParticlePacking, count: int, rng: np.random.Generator, box: Box | None = None, offset: float = OFFSET
+    packing: ParticlePacking,
+    count: int,
+    rng: np.random.Generator,
+    box: Box | None = None,
+    offset: float = OFFSET,
+    narrow: float = NARROW,
 ) -> FittedSeeds:
     r"""About `count` seeds whose Laguerre facets follow the surfaces of spherical packing.
 
@@ -97,6 +102,9 @@ def fitted_seeds(
     offset : float
         Distance of the seeds of a pair from the interface, in seed spacings; 0.15 is best for the conductivity, 0.4,
         near the middle of the cells, for a transient.
+    narrow : float
+        The same where another inclusion is near, in widths of the gap. The conductivity depends on it as far as the
+        lattice does not resolve the gaps.
 
     Returns
     -------
@@ -133,7 +141,7 @@ def fitted_seeds(
             f"inclusion {small} of radius {packing.radii[small]:.4g} is too small for {count} lattice particles: "
             f"use at least {needed}"
         )
-    pairs = _pairs_on_spheres(packing, h, offset * h, rng)
+    pairs = _pairs_on_spheres(packing, h, (offset * h, narrow), rng)
     bulk = pack_lattice(count, box.lengths, rng, periodic=box.periodic, density=0.5, spread=0.0).centers
     bulk = bulk[_interface_distance(packing, bulk) > CLEARANCE * h]
     return _tuned(packing, pairs, bulk, h, box)
@@ -149,8 +157,11 @@ def _spacing(packing: ParticlePacking, count: int, box: Box) -> float:
     return h
 
 
-def _pairs_on_spheres(inclusions: ParticlePacking, h: float, widest: float, rng: np.random.Generator) -> _Pairs:
+def _pairs_on_spheres(
+    inclusions: ParticlePacking, h: float, offsets: tuple[float, float], rng: np.random.Generator
+) -> _Pairs:
     """Pairs spread over every sphere, less those within another sphere or beyond a wall."""
+    widest, narrow = offsets
     box, centers, radii = inclusions.box, inclusions.centers, inclusions.radii
     numbers = np.maximum(np.round(4.0 * np.pi * radii**2 / (PATCH * h * h)), FEWEST_PAIRS).astype(np.int64)
     sphere = np.repeat(np.arange(radii.size), numbers)
@@ -162,7 +173,7 @@ def _pairs_on_spheres(inclusions: ParticlePacking, h: float, widest: float, rng:
     gap = _gap_to_others(inclusions, sphere, points, 2.0 * h)
     keep = inside_box & (gap > 0.0)
     sphere, normal, gap = sphere[keep], normal[keep], gap[keep]
-    offset = np.minimum(np.minimum(widest, 0.5 * radii[sphere]), np.maximum(NARROW * gap, NARROWEST * h))
+    offset = np.minimum(np.minimum(widest, 0.5 * radii[sphere]), np.maximum(narrow * gap, NARROWEST * h))
     return _Pairs(sphere, normal, offset, gap > NARROWEST * h)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from etc_engine.arrays import Floats
 from etc_engine.box import AXES
 from etc_engine.engines.voxel.conductivity import VoxelConductivity, voxel_conductivity
+from etc_engine.engines.voxel.connectivity import conducting_voxels, joined_voxels
 from etc_engine.engines.voxel.green import GradientProjection, gradient_projection
 from etc_engine.engines.voxel.iterations import LoadSolution, Projection, solve_conjugate_gradients, solve_eyre_milton
 from etc_engine.engines.voxel.walls import WallProjection, wall_projection
@@ -121,7 +122,9 @@ def solve_cell(
     other side. `tolerance` bounds the change of the polarization with Eyre-Milton, to which the error of the
     conductivity is proportional; conjugate gradients estimate that error itself, which is the square of the
     residual's, and need about half the iterations for it. Where voxels insulate, what is below 1e-8 of the largest
-    conductivity is rounding, and returned as 0 with no error.
+    conductivity is rounding, and returned as 0 with no error. So is the conductivity along an axis along which the
+    conducting voxels join over corners or edges alone: the discrete operator lets heat through those, which falls
+    with the logarithm of the voxel only.
 
     Examples
     --------
@@ -148,7 +151,7 @@ def solve_cell(
             part, found = _solve_fluxes(image, projection, group, scheme)
         else:
             part, found = _solve_loads(image, projection.onto_gradients, group, scheme, keep_gradients)
-            _cut_off(part, found, group, image)
+            _cut_off(part, found, group, image, boundary)
         known = np.ix_(group, group)
         tensor[known] = part[known]
         loads += found
@@ -234,13 +237,16 @@ def _solve_loads(
     return tensor, loads
 
 
-def _cut_off(tensor: Floats, loads: list[LoadSolution], axes: tuple[int, ...], image: VoxelConductivity) -> None:
-    """Make 0 what insulators leave of the conductivity along an axis that nothing conducts along."""
+def _cut_off(
+    tensor: Floats, loads: list[LoadSolution], axes: tuple[int, ...], image: VoxelConductivity, boundary: str
+) -> None:
+    """Make 0 the conductivity along an axis that nothing conducts along: rounding, and paths over corners alone."""
     least, largest = image.extremes()
     if least > NOTHING * largest:
         return
+    joined = joined_voxels(conducting_voxels(image, NOTHING * largest), periodic=boundary == "periodic")
     for number, axis in enumerate(axes):
-        if tensor[axis, axis] <= CUT_OFF * largest:
+        if axis not in joined or tensor[axis, axis] <= CUT_OFF * largest:
             tensor[axis, list(axes)] = tensor[list(axes), axis] = 0.0
             loads[number] = replace(loads[number], error=0.0)
 

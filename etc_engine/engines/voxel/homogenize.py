@@ -14,13 +14,18 @@ from etc_engine.errors import ConvergenceError
 from etc_engine.medium.conduction import Conduction, Result, attempt
 from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.medium import Medium
-from etc_engine.medium.phases import contrast
+from etc_engine.medium.phases import contrast, without_cut_axes
 
 COARSEST = 4.0
 """Voxels across the smallest inclusion of the coarsest grid that takes part in the error estimate."""
 
 RINGING_LIMIT = 300
 """Iterations after which the continuous Green operator is left out of the error estimate."""
+
+WEIGHT, ALONE = 2.5, 4.0
+"""Weight of the difference to half the resolution in the error estimate, and without the continuous operator: with 2,
+16 of 450 square arrays (contrasts 0 to infinity, fractions .1 to .7, 32 to 192 voxels) were off by 1.1 to 1.7 times the
+estimate."""
 
 
 def homogenize_voxel(
@@ -70,11 +75,14 @@ def homogenize_voxel(
     constant whose sign may change with the grid, so that one difference says too little; the estimate is
 
     .. math:: \varepsilon = \varepsilon_{solver} +
-              \max\big(2 |k_h - k_{2h}|, |k_{2h} - k_{4h}|, |k_h - k^{cont}_{2h}|\big) / k_h
+              \max\big(w |k_h - k_{2h}|, |k_{2h} - k_{4h}|, |k_h - k^{cont}_{2h}|\big) / k_h
 
-    with the largest over the axes. The second is left out where an inclusion spans less than 4 voxels of size 4h; cont
-    is the continuous Green operator, whose error has the other sign (left out at contrast 0 and infinity, where it
-    does not converge).
+    with the largest over the axes; w is 2.5, and 4 without the last term. The second is left out where an inclusion
+    spans less than 4 voxels of size 4h; cont is the continuous Green operator, whose error has the other sign (left out
+    at contrast 0 and infinity, where it does not converge).
+
+    Where the pores insulate, an axis along which the conducting inclusions join at points alone has the conductivity 0:
+    voxels that two of them share would let heat through.
 
     References
     ----------
@@ -98,6 +106,7 @@ def homogenize_voxel(
     def solve(resolution: int, scheme: Scheme) -> tuple[CellSolution, float, int]:
         image = voxelize(medium, resolution, voxels)
         solution = solve_cell(image.conductivity, box.lengths, boundary=boundary, scheme=scheme, axes=axes)
+        solution = replace(solution, tensor=without_cut_axes(solution.tensor, medium, boundary))
         return solution, image.volume_fraction, image.fractions.size
 
     fine, fraction, unknowns = solve(resolution, scheme)
@@ -107,16 +116,18 @@ def homogenize_voxel(
     elif estimate_error:
         half, quarter = (resolution + 1) // 2, (resolution + 3) // 4
         middle = solve(half, scheme)[0]
-        differences = [2.0 * _difference(fine, middle)]
+        differences = [WEIGHT * _difference(fine, middle)]
         if smallest_diameter(medium, quarter) >= COARSEST:
             differences.append(_difference(middle, solve(quarter, scheme)[0]))
-        least, largest = contrast(medium)
+        (least, largest), alone = contrast(medium), ALONE * _difference(fine, middle)
         if least > 0.0 and np.isfinite(largest) and medium.pores.conductivity > 0.0:
             try:
                 other = replace(scheme, green="continuous", limit=RINGING_LIMIT)
                 differences.append(_difference(fine, solve(half, other)[0]))
-            except ConvergenceError:  # a large contrast: the other differences have to do
-                differences.append(0.0)
+            except ConvergenceError:  # a large contrast
+                differences.append(alone)
+        else:
+            differences.append(alone)
         error = float(max(differences) + fine.solver_error)
     along = np.diag(fine.tensor)
     return EffectiveConductivity(

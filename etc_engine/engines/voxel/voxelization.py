@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from etc_engine.engines.voxel.conductivity import VoxelConductivity
 from etc_engine.engines.voxel.pieces import Pieces, find_pieces
 from etc_engine.errors import InputError
-from etc_engine.medium.backbone import joined_axes
 from etc_engine.medium.medium import Medium
-from etc_engine.medium.phases import ROUNDING, check_phases, of_owners
-from etc_engine.packing.neighbors import neighbor_pairs
+from etc_engine.medium.phases import check_phases, of_owners, overlapping_axes
 
 VOXELS = ("laminate", "binary")
 FADING = 100.0
@@ -258,13 +256,7 @@ def _share_faded(contrast: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _reach_through(medium: Medium, members: NDArray[np.bool_]) -> bool:
     """Whether some of the inclusions overlap all the way across the cell, along any axis."""
-    inclusions = medium.packing
-    found = neighbor_pairs(inclusions)
-    overlap = members[found.pairs].all(axis=1) & (found.gaps < -ROUNDING * inclusions.radii.mean())
-    depth = np.stack((inclusions.centers, np.asarray(inclusions.box.lengths) - inclusions.centers), axis=2)
-    reaching = (depth <= inclusions.radii[:, None, None]) & members[:, None, None]
-    nodes, walls = np.nonzero(reaching.reshape(inclusions.count, -1))
-    return bool(joined_axes(inclusions, found.pairs[overlap], found.shifts[overlap], nodes, walls))
+    return bool(overlapping_axes(medium.packing, members, medium.packing.box.periodic))
 
 
 def _frame(normals: NDArray[np.float64]) -> NDArray[np.float64]:
