@@ -110,6 +110,7 @@ def homogenize_command(
         click.echo(f"etc-engine: note: {moved} wrapped into it", err=True)
     medium = _medium(table, inclusions, given.pop("matrix"), given.pop("inclusion"))
     _warn_of_overlaps(medium)
+    _warn_of_cuts(medium)
     boundary = boundary or ("periodic" if all(medium.box.periodic) else "walls")
     method, seed, options = _choices(engine, medium, given | {"boundary": boundary})
     if plot is not None and engine.section is None:
@@ -201,6 +202,21 @@ def _warn_of_overlaps(medium: Medium) -> None:
     click.echo(f"etc-engine: warning: {who} union counts once{divided if differ else ''}", err=True)
 
 
+def _warn_of_cuts(medium: Medium) -> None:
+    from etc_engine.structure.filling import find_losses
+
+    losses = find_losses(medium.packing)
+    if losses.cut_particles == 0:
+        return
+    who = "1 inclusion: it loses" if losses.cut_particles == 1 else f"{losses.cut_particles} inclusions: they lose"
+    full, left = medium.packing.density, medium.packing.density - losses.cut
+    click.echo(
+        f"etc-engine: warning: walls cut {who} {losses.cut:.4g} of the box, so that the full fraction of {full:.4g} "
+        f"becomes {left:.4g}",
+        err=True,
+    )
+
+
 def _threads() -> int:
     """Threads of this process, as the environment gives them to BLAS and OpenMP too."""
     word = os.environ.get("OMP_NUM_THREADS", "1")
@@ -210,9 +226,12 @@ def _threads() -> int:
 def _record(
     medium: Medium, engine: str, method: str, boundary: str, result: EffectiveConductivity[Any]
 ) -> dict[str, Any]:
+    from etc_engine.cli.options import per_axis_and_tensor
     from etc_engine.medium.phases import count_overlaps
     from etc_engine.models.bounds import parallel, series
+    from etc_engine.structure.filling import find_losses
 
+    losses = find_losses(medium.packing)
     kappa, pores = medium.conductivity, medium.pores.conductivity
     record: dict[str, Any] = {
         "engine": engine,
@@ -221,8 +240,12 @@ def _record(
         "dimension": medium.dimension,
         "inclusions": medium.packing.count,
         "overlaps": count_overlaps(medium.packing),
-        "conductivity_tensor": result.tensor,
+        **per_axis_and_tensor(result.tensor, tuple(range(medium.dimension))),
         "volume_fraction": result.solid_fraction,
+        "full_volume_fraction": medium.packing.density,
+        "overlap_volume_fraction": losses.overlap,
+        "cut_volume_fraction": losses.cut,
+        "cut_inclusions": losses.cut_particles,
     }
     if float(kappa.min()) == float(kappa.max()):
         phases = pores, float(kappa[0]), medium.solid_fraction
@@ -239,11 +262,14 @@ def _write(files: ExitStack, path: Path | None, table: ParticleTable, medium: Me
     if path is None:
         return
     from etc_engine.box import AXES
+    from etc_engine.cli.options import tensor_of
     from etc_engine.durable.files import replacing
     from etc_engine.durable.provenance import engine_version
     from etc_engine.particle_files.netcdf import packing_dataset
 
-    attributes = {key: value for key, value in record.items() if key != "conductivity_tensor"}
+    attributes = {key: value for key, value in record.items() if not key.startswith("conductivity_")}
+    if "conductivity_bounds" in record:
+        attributes["conductivity_bounds"] = record["conductivity_bounds"]
     attributes |= {
         "title": f"effective conductivity of {medium.packing.count} inclusions in a matrix",
         "matrix_conductivity": medium.pores.conductivity,
@@ -254,7 +280,7 @@ def _write(files: ExitStack, path: Path | None, table: ParticleTable, medium: Me
     axes = list(AXES[: medium.dimension])
     dataset["effective_conductivity"] = (
         ("direction_i", "direction_j"),
-        record["conductivity_tensor"],
+        tensor_of(record),
         {"long_name": "effective conductivity", "units": "W m-1 K-1"},
     )
     dataset = dataset.assign_coords(direction_i=axes, direction_j=axes)
@@ -268,7 +294,7 @@ def _draw(
     from etc_engine.durable.files import replacing
     from etc_engine.output.figures.voxel import save_section
 
-    caption = f"k$_{{xx}}$ = {record['conductivity_tensor'][0, 0]:.6g} W/(m K), f = {record['volume_fraction']:.4f}"
+    caption = f"k$_{{xx}}$ = {record['conductivity_per_axis']['x']:.6g} W/(m K), f = {record['volume_fraction']:.4f}"
     save_section(section(*task), files.enter_context(replacing(path)), caption)
 
 
@@ -276,6 +302,8 @@ def _print_table(record: dict[str, Any]) -> None:
     for name, value in record.items():
         if name == "conductivity_tensor":
             text = "; ".join(" ".join(f"{k:.8g}" for k in row) for row in value)
+        elif name == "conductivity_per_axis":
+            text = ", ".join(f"{axis} {k:.8g}" for axis, k in value.items())
         elif name == "conductivity_bounds":
             text = f"{value[0]:.8g} (series) to {value[1]:.8g} (parallel)"
         else:

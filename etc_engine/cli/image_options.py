@@ -53,6 +53,7 @@ class ImageWords:
         ------
         InputError, ConvergenceError
         """
+        from etc_engine.cli.options import per_axis_and_tensor
         from etc_engine.engines.voxel.images import homogenize_image
         from etc_engine.models.bounds import parallel, series
         from etc_engine.particle_files.images import read_image
@@ -71,7 +72,7 @@ class ImageWords:
             "boundary": given.boundary,
             "dimension": image.labels.ndim,
             "voxels": list(image.labels.shape),
-            "conductivity_tensor": solution.tensor,
+            **per_axis_and_tensor(solution.tensor, tuple(range(image.labels.ndim))),
             "phases": {str(label): phases[label] for label in image.phases},
             "fractions": {str(label): share for label, share in zip(image.phases, image.fractions, strict=True)},
         }
@@ -146,19 +147,19 @@ def write_image_result(path: Path, record: dict[str, Any]) -> None:
     import xarray
 
     from etc_engine.box import AXES
+    from etc_engine.cli.options import tensor_of
     from etc_engine.durable.files import replacing
     from etc_engine.durable.provenance import engine_version
 
     axes = list(AXES[: record["dimension"]])
-    attributes = {
-        key: value for key, value in record.items() if key not in ("conductivity_tensor", "phases", "fractions")
-    }
+    apart = ("conductivity_tensor", "conductivity_per_axis", "phases", "fractions")
+    attributes = {key: value for key, value in record.items() if key not in apart}
     labels = [int(label) for label in record["phases"]]
     dataset = xarray.Dataset(
         {
             "effective_conductivity": (
                 ("direction_i", "direction_j"),
-                record["conductivity_tensor"],
+                tensor_of(record),
                 {"long_name": "effective conductivity", "units": "W m-1 K-1"},
             ),
             "phase_conductivity": (

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from etc_engine.box import Box, parse_periodic
+from etc_engine.box import AXES, Box, parse_periodic
 from etc_engine.durable.files import replacing
 from etc_engine.errors import InputError, OutputError
 
@@ -23,6 +23,27 @@ def parse_box(lengths: str, periodic: str) -> Box:
     except ValueError:
         raise InputError(f"--box takes edge lengths separated by commas, such as 1,1: found {lengths!r}") from None
     return Box(edges, parse_periodic(periodic, len(edges)))
+
+
+def per_axis_and_tensor(tensor: Any, axes: tuple[int, ...]) -> dict[str, Any]:
+    """The conductivity along the axes, and the whole tensor where all of its components are known.
+
+    Between walls a heat flow has a conductivity along the axis alone: the other components do not exist.
+    """
+    found: dict[str, Any] = {"conductivity_per_axis": {AXES[a]: float(tensor[a, a]) for a in axes}}
+    if all(math.isfinite(k) for row in tensor.tolist() for k in row):
+        found["conductivity_tensor"] = tensor
+    return found
+
+
+def tensor_of(record: dict[str, Any]) -> Any:
+    """The tensor of such a record, with NaN for components that do not exist, as netCDF marks what is missing."""
+    import numpy as np
+
+    along = np.array(list(record["conductivity_per_axis"].values()))
+    whole = np.full((along.size, along.size), np.nan)
+    np.fill_diagonal(whole, along)
+    return record.get("conductivity_tensor", whole)
 
 
 def print_json(record: dict[str, Any]) -> None:

@@ -156,21 +156,19 @@ def _record(
 ) -> dict[str, Any]:
     import numpy as np
 
-    from etc_engine.box import AXES
+    from etc_engine.cli.options import per_axis_and_tensor
     from etc_engine.realization import Status
     from etc_engine.structure.filling import find_filling
 
-    network, axis = medium.links, axes[0]
+    network, axis, height = medium.links, axes[0], find_filling(medium.packing).fill_height
     percolates = bool(result.spans[axis])
     status = Status.OK if percolates else Status.NOT_PERCOLATING
     record: dict[str, Any] = {
         "engine": asked.engine,
         "method": method,
         "conductivity": float(result.tensor[axis, axis]),
-        "conductivity_per_axis": {AXES[a]: float(result.tensor[a, a]) for a in axes},
+        **per_axis_and_tensor(result.tensor, axes),
     }
-    if all(medium.box.periodic):
-        record["conductivity_tensor"] = result.tensor
     if result.bounds is not None:
         record["conductivity_bounds"] = result.bounds[axis]
     if np.isfinite(result.model_error):
@@ -178,7 +176,7 @@ def _record(
     return record | {
         "particles": medium.packing.count,
         "density": medium.packing.density,
-        "fill_height": find_filling(medium.packing).fill_height,
+        **({} if height is None else {"fill_height": height}),
         "pore_conductivity": medium.pores.conductivity,
         "contact_rule": network.rule,
         **asked.physics.record,

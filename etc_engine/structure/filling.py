@@ -8,6 +8,7 @@ import numpy as np
 
 from etc_engine.arrays import Floats, Ints
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.structure.union import solid_fraction
 
 DEEP = 0.5
 """A wall that cuts off more than this part of a radius goes through particles that it should hold."""
@@ -33,9 +34,9 @@ class Filling:
     deep_cuts: Ints
 
     @property
-    def fill_height(self) -> float:
-        """Highest surface along the last axis, above the low face of the box [m]."""
-        return float(self.extent[-1, 1])
+    def fill_height(self) -> float | None:
+        """Highest surface along the last axis, above the low face of the box [m]; None where that axis repeats."""
+        return None if np.isnan(self.free[-1]) else float(self.extent[-1, 1])
 
 
 def find_filling(packing: ParticlePacking) -> Filling:
@@ -67,3 +68,43 @@ def find_filling(packing: ParticlePacking) -> Filling:
 def free_walls(packing: ParticlePacking, filling: Filling) -> Ints:
     """Walls with room for one more layer of the largest particles in front of them."""
     return np.flatnonzero(filling.free > 2.0 * packing.radii.max())
+
+
+@dataclass(frozen=True)
+class Losses:
+    """What full particles lose in their box, as parts of its volume (area).
+
+    Parameters
+    ----------
+    cut_particles : int
+        Particles that walls cut.
+    cut : float
+        Part outside the walls.
+    overlap : float
+        Part that several particles share, counted once less than they are.
+    """
+
+    cut_particles: int
+    cut: float
+    overlap: float
+
+
+def find_losses(packing: ParticlePacking) -> Losses:
+    """What walls cut off the particles, and what they share: density = solid fraction + cut + overlap.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> half = ParticlePacking([[0.0, 0.5]], [0.25], Box((1.0, 1.0)))
+    >>> losses = find_losses(half)
+    >>> losses.cut_particles, round(losses.cut / half.density, 12), round(losses.overlap, 12)
+    (1, 0.5, 0.0)
+    """
+    box, lengths = packing.box, np.asarray(packing.box.lengths)
+    inside = np.minimum(packing.centers, lengths - packing.centers)
+    rows = np.flatnonzero(((inside < packing.radii[:, None]) & ~np.asarray(box.periodic)).any(axis=1))
+    cut = 0.0
+    for row in rows.tolist():
+        one = ParticlePacking(packing.centers[row : row + 1], packing.radii[row : row + 1], box)
+        cut += one.density - solid_fraction(one)
+    return Losses(rows.size, cut, max(packing.density - cut - solid_fraction(packing), 0.0))

@@ -75,13 +75,42 @@ def test_disks_with_a_column_of_conductivities(etc_engine, table):
     assert kxx > 1.0
 
 
-def test_walls_leave_only_the_diagonal(etc_engine, table):
+def test_walls_leave_only_the_diagonal(etc_engine, table, tmp_path):
     path = table("0.5,0.5,0.3", header="x,y,radius")
     options = ("--matrix", "1", "--inclusion", "9", "--resolution", "32", "--json")
     walled = json.loads(etc_engine("homogenize", path, "--box", "1,1", "--boundary", "walls", *options).stdout)
     free = json.loads(etc_engine("homogenize", path, "--box", "1,1", *options).stdout)
-    assert walled["conductivity_tensor"][0][1] is None
-    assert walled["conductivity_tensor"][0][0] == pytest.approx(free["conductivity_tensor"][0][0], rel=1e-7)
+    assert "conductivity_tensor" not in walled  # components off the diagonal do not exist between walls
+    assert walled["conductivity_per_axis"]["x"] == pytest.approx(free["conductivity_tensor"][0][0], rel=1e-7)
+    assert free["conductivity_per_axis"] == {axis: free["conductivity_tensor"][i][i] for i, axis in enumerate("xy")}
+    text = etc_engine("homogenize", path, "--box", "1,1", "--boundary", "walls", *options[:-1], "-o", tmp_path / "o.nc")
+    assert "nan" not in text.stdout
+    assert f"conductivity per axis   x {walled['conductivity_per_axis']['x']:.8g}, y " in text.stdout
+    for words in ((), ("--json",)):
+        told = etc_engine("info", tmp_path / "o.nc", *words)
+        assert told.returncode == 0
+        assert "nan" not in told.stdout.lower()
+
+
+def test_what_walls_cut_and_particles_share_is_printed(etc_engine, table):
+    """Half of one disk, and the lens of two others, in closed form."""
+    path = table("0,0.25,0.2", "0.4,0.7,0.2", "0.6,0.7,0.2", header="x,y,radius")
+    common = ("homogenize", path, "--box", "1,1", "--matrix", 1, "--inclusion", 3, "--resolution", 32)
+    done = etc_engine(*common, "--boundary", "walls", "--json")
+    record = json.loads(done.stdout)
+    lens = 2.0 * 0.04 * np.arccos(0.5) - 0.1 * np.sqrt(4 * 0.04 - 0.04)
+    assert record["full_volume_fraction"] == pytest.approx(0.12 * np.pi, rel=1e-12)
+    assert record["cut_volume_fraction"] == pytest.approx(0.02 * np.pi, rel=1e-12)
+    assert record["overlap_volume_fraction"] == pytest.approx(lens, rel=1e-9)
+    assert record["volume_fraction"] == pytest.approx(0.10 * np.pi - lens, rel=1e-9)
+    assert record["cut_inclusions"] == 1
+    assert (
+        "warning: walls cut 1 inclusion: it loses 0.06283 of the box, so that the full fraction of 0.377 becomes 0.3142"
+        in done.stderr
+    )
+    text = etc_engine(*common).stdout
+    assert "overlap volume fraction" in text
+    assert "cut volume fraction     0\n" in text
 
 
 def test_a_packing_brings_its_own_box(etc_engine, tmp_path):
