@@ -39,12 +39,16 @@ class PartType(click.ParamType):
 
 @click.command("sweep")
 @click.argument("study", type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="netCDF file to write.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="netCDF file to write. Only --dry-run does without."
+)
 @click.option("--resume", is_flag=True, help="Continue an earlier run. Start anew where there is none.")
 @click.option("--overwrite", is_flag=True, help="Start anew and replace what is there.")
 @click.option("--dry-run", is_flag=True, help="Print units, time, memory and what is there. Write nothing.")
 @click.option("--part", type=PartType(), help="Compute part K of N only. --resume without --part joins all parts.")
-def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_run: bool, part: Part | None) -> int:
+def sweep_command(
+    study: Path, output: Path | None, resume: bool, overwrite: bool, dry_run: bool, part: Part | None
+) -> int:
     """Run all realizations of STUDY (a TOML file) and write one dataset.
 
     Under mpirun every rank computes. The result has the same bits for any number of ranks. Finished units are kept
@@ -56,14 +60,18 @@ def sweep_command(study: Path, output: Path, resume: bool, overwrite: bool, dry_
         raise click.UsageError("--resume and --overwrite exclude each other")
     if dry_run and part is not None:
         raise click.UsageError("--dry-run is of the whole study: leave out --part")
-    if output.exists() and study.exists() and output.samefile(study):
+    if output is not None and output.exists() and study.exists() and output.samefile(study):
         raise OutputError(f"the output {output} is the study file itself: choose another name")
     if dry_run:
         from etc_engine.cli.options import check_place  # loads numpy
 
-        check_place(output, replaces_result=True)
+        if output is not None:
+            check_place(output, replaces_result=True)
+        return _connected(lambda communicator, engine: _foretell(study, output, communicator, engine), None)
+    if output is None:
+        raise click.UsageError("Missing option '-o' / '--output'.")
     policy: Policy = "resume" if resume else "overwrite" if overwrite else "fresh"
-    return launch(study, output, policy, dry_run=dry_run, part=part)
+    return launch(study, output, policy, part=part)
 
 
 def launch(
@@ -72,12 +80,9 @@ def launch(
     policy: Policy,
     realize: Realize | None = None,
     *,
-    dry_run: bool = False,
     part: Part | None = None,
 ) -> int:
     """Run a sweep on the ranks that were started; returns the exit status. ``realize`` may be a stand-in."""
-    if dry_run:
-        return _connected(lambda communicator, engine: _foretell(study, output, communicator, engine), realize)
     with signals_held_back():
         return _connected(lambda communicator, engine: _run(study, output, policy, communicator, engine, part), realize)
 
@@ -178,7 +183,7 @@ def _commonest_message(output: Path, *, failed: bool) -> str:
     return messages.most_common(1)[0][0] if messages else "no reason given"
 
 
-def _foretell(study: Path, output: Path, communicator: Communicator, realize: Realize) -> int:
+def _foretell(study: Path, output: Path | None, communicator: Communicator, realize: Realize) -> int:
     """Print the forecast of a sweep; rank 0 probes, the others wait."""
     from functools import partial
 

@@ -195,6 +195,10 @@ def _make_folder(output: Path, part: Part | None) -> Path:
     """The folder of the shards, made if it is not there."""
     if output.is_dir():
         raise OutputError(f"output {output} is a folder: expected the name of a netCDF file to write")
+    if output.exists() and not output.is_file():
+        raise OutputError(
+            f"output {output} is a device or a pipe: expected the name of a netCDF file to write; --dry-run writes none"
+        )
     if not output.parent.is_dir():
         raise OutputError(f"output {output}: there is no folder {output.parent}, make it first")
     folder = _folder(output, part)

@@ -63,8 +63,8 @@ class Forecast:
         return self.first_seconds + max(even, *self.unit_seconds)
 
 
-def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Forecast:
-    """Probe a study without writing anything.
+def forecast(study_path: Path, output: Path | None, ranks: int, realize: Realize) -> Forecast:
+    """Probe a study without writing anything; without an output nothing of it is finished.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def forecast(study_path: Path, output: Path, ranks: int, realize: Realize) -> Fo
         If the packing of a probe does not reach its density.
     """
     study, _ = read_study(study_path)
-    state, done = what_is_there(study, output)
+    state, done = ("no output is named", set()) if output is None else what_is_there(study, output)
     targets = (study.statistics.realizations,) * len(study.densities)
     units = units_to_run(study.densities, targets, np.empty((0, 2), np.int64))
     first, record = _probe(study, units[0], realize)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -116,6 +117,10 @@ def test_a_dry_run_tells_units_time_and_memory_and_writes_nothing(etc_engine, re
     assert lines["time"].startswith("about ")
     assert 20.0 < float(lines["memory"].split()[0]) < 5000.0
     assert list(tmp_path.iterdir()) == []
+    unnamed = etc_engine("sweep", study, "--dry-run")
+    assert unnamed.returncode == 0
+    assert "no output is named" in unnamed.stdout
+    assert "Missing option '-o'" in etc_engine("sweep", study).stderr
     again = etc_engine("sweep", study, "-o", result, "--dry-run")
     assert "the output is complete: --resume does nothing" in again.stdout
     study_text = study.read_text()
@@ -133,3 +138,16 @@ def test_a_dry_run_fails_where_a_density_is_out_of_reach(etc_engine, result, tmp
     assert "density 0.95 is out of reach" in done.stderr
     assert "own 0.77" in done.stderr  # what the packer reaches
     assert not list(tmp_path.glob("new.nc*"))
+
+
+@pytest.mark.parametrize("policy", [(), ("--overwrite",), ("--resume",)])
+def test_a_sweep_onto_a_device_or_a_pipe_is_refused_before_it_computes(etc_engine, result, tmp_path, policy):
+    os.mkfifo(tmp_path / "pipe")
+    for place in ("/dev/null", tmp_path / "pipe"):
+        done = etc_engine("sweep", result.with_name("study.toml"), "-o", place, *policy)
+        assert done.returncode == 2
+        assert done.stderr.splitlines() == [
+            f"etc-engine: output {place} is a device or a pipe: expected the name of a netCDF file to write; "
+            "--dry-run writes none"
+        ]
+    assert [path.name for path in tmp_path.iterdir()] == ["pipe"]

@@ -7,7 +7,7 @@ import pytest
 
 from etc_engine import Box, Medium, ParticlePacking, effective_conductivity, field_along, overlap_contacts
 from etc_engine.output.figures.field import save_field
-from etc_engine.output.figures.spheres import draw_view, slice_axes, slice_temperatures
+from etc_engine.output.figures.spheres import draw_view, slice_axes, slice_place, slice_temperatures
 from etc_engine.output.sphere_vtk import unit_sphere
 from etc_engine.output.vtk import write_vtp
 
@@ -40,7 +40,7 @@ def test_temperatures_inside_meet_at_the_contacts(method):
 def test_the_slice_falls_along_the_load_and_is_empty_between_spheres(periodic):
     field = field_of(array_of(periodic))
     assert slice_axes(field.axis) == (0, 2, 1)
-    image = slice_temperatures(field, 90)
+    image = slice_temperatures(field, 90, 1.5)
     assert image.shape == (90, 90)
     assert np.isnan(image[0, 0]) == (not periodic) or np.isnan(image[29:31, 29:31]).any()
     column = image[:, 15]
@@ -49,6 +49,18 @@ def test_the_slice_falls_along_the_load_and_is_empty_between_spheres(periodic):
     if periodic:  # a mean gradient of one
         assert column[75] - column[15] == pytest.approx(2.0, abs=1e-6)
     assert image[:, 15] == pytest.approx(image[:, 75], abs=1e-6)
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_the_slice_is_put_through_a_layer_and_not_between_two(periodic):
+    """Two layers: the middle of the box, y = 1, is between them. Of three, the middle is in one."""
+    two, three = array_of(periodic, 2), array_of(periodic, 3)
+    assert abs(slice_place(two, 1) - 1.0) == pytest.approx(0.5, abs=0.011)
+    assert slice_place(three, 1) == pytest.approx(1.5, abs=0.016)
+    field = field_of(two)
+    through, between = (np.isfinite(slice_temperatures(field, 60, y)).mean() for y in (slice_place(two, 1), 1.0))
+    assert through > 0.7
+    assert between < 0.2
 
 
 def test_the_view_shows_the_sphere_in_front():

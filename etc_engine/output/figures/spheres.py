@@ -17,6 +17,8 @@ from etc_engine.packing.particles import ParticlePacking
 
 PIXELS = 700
 """Along the longer side of the slice and of the view."""
+PLANES = 101
+"""Planes of which the one with the largest area of spheres is drawn."""
 TOWARDS = np.array([1.0, -1.35, 0.75]) / np.linalg.norm([1.0, -1.35, 0.75])
 """Direction from the bed to the eye."""
 LIGHT = np.array([0.25, -0.75, 0.6]) / np.linalg.norm([0.25, -0.75, 0.6])
@@ -25,7 +27,7 @@ COLOURS = colormaps["inferno"].with_extremes(bad="0.75")
 
 
 def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
-    """Picture of a bed of spheres: the slice through its middle along the load, and a view of its surface.
+    """Picture of a bed of spheres: the slice along the load that cuts most of them, and a view of its surface.
 
     Parameters
     ----------
@@ -43,11 +45,12 @@ def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
     width, height = packing.box.lengths[across], packing.box.lengths[up]
     figure = Figure(figsize=(11.0, 5.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    image = slice_temperatures(field, PIXELS)
+    place = slice_place(packing, normal)
+    image = slice_temperatures(field, PIXELS, place)
     shown = left.imshow(image, extent=(0, width, 0, height), origin="lower", cmap=COLOURS, norm=scale)
     left.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", aspect="equal", facecolor="0.9")
     left.locator_params(nbins=6)
-    left.set_title(f"slice at {AXES[normal]} = {0.5 * packing.box.lengths[normal]:.3g} m", fontsize=9)
+    left.set_title(f"slice at {AXES[normal]} = {place:.3g} m", fontsize=9)
     view, frame = draw_view(packing, COLOURS(scale(np.ma.masked_invalid(field.particle_temperatures))), PIXELS)
     right.imshow(view, extent=frame, interpolation="bilinear", zorder=2)
     _draw_edges(right, packing)
@@ -74,14 +77,43 @@ def slice_axes(load: int) -> tuple[int, int, int]:
     return across, up, normal
 
 
-def slice_temperatures(field: ParticleField, pixels: int) -> Floats:
-    """Temperatures in the middle plane of the box that contains the load axis, NaN between the spheres.
+def slice_place(packing: ParticlePacking, normal: int) -> float:
+    """Place of the plane that cuts the largest area of spheres [m]; of equal ones the nearest to the middle.
+
+    Parameters
+    ----------
+    packing : ParticlePacking
+    normal : int
+        Axis normal to the plane.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> layers = ParticlePacking([[0.5, 0.5, 0.5], [0.5, 0.5, 1.5]], [0.5, 0.45], Box((1.0, 1.0, 2.0)))
+    >>> round(slice_place(layers, 2), 6)  # the middle, z = 1, is between the layers
+    0.5
+    """
+    length = packing.box.lengths[normal]
+    places = np.linspace(0.0, length, PLANES)
+    area = np.zeros(PLANES)
+    for step in (-1.0, 0.0, 1.0) if packing.box.periodic[normal] else (0.0,):
+        for k, place in enumerate(places.tolist()):
+            offset = place - packing.centers[:, normal] - step * length
+            area[k] += np.maximum(packing.radii**2 - offset**2, 0.0).sum()
+    best = np.flatnonzero(area >= area.max() * (1.0 - 1e-9))
+    return float(places[best[np.argmin(np.abs(places[best] - 0.5 * length))]])
+
+
+def slice_temperatures(field: ParticleField, pixels: int, place: float) -> Floats:
+    """Temperatures in a plane that contains the load axis, NaN between the spheres.
 
     Parameters
     ----------
     field : ParticleField
     pixels : int
         Along the longer edge.
+    place : float [m]
+        Of the plane, along its normal.
 
     Returns
     -------
@@ -99,7 +131,7 @@ def slice_temperatures(field: ParticleField, pixels: int) -> Floats:
     relative = np.zeros((rows, columns, 3))
     for image in _images(packing):
         centers = packing.centers + image * lengths
-        offset = 0.5 * lengths[normal] - centers[:, normal]
+        offset = place - centers[:, normal]
         for p in np.flatnonzero(np.abs(offset) < packing.radii):
             reach = np.sqrt(packing.radii[p] ** 2 - offset[p] ** 2)
             i = slice(*np.searchsorted(x, centers[p, across] + np.array([-reach, reach])))
@@ -110,8 +142,8 @@ def slice_temperatures(field: ParticleField, pixels: int) -> Floats:
             inside = (power <= 0.0) & (power < nearest[j, i])
             nearest[j, i][inside] = power[inside]
             owner[j, i][inside] = p
-            place = np.stack(np.broadcast_arrays(dx, dy, offset[p]), axis=-1)[inside]
-            relative[j, i][inside] = place[:, np.argsort([across, up, normal])]
+            spot = np.stack(np.broadcast_arrays(dx, dy, offset[p]), axis=-1)[inside]
+            relative[j, i][inside] = spot[:, np.argsort([across, up, normal])]
     drawn = owner >= 0
     values = np.full((rows, columns), np.nan)
     if field.inside is not None:
