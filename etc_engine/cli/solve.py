@@ -100,7 +100,6 @@ def solve_command(
     Along the load axis one wall is held at the temperature 1 and the other at 0, unless the box is periodic.
     """
     start = time.perf_counter()
-    import numpy as np
 
     from etc_engine.cli.options import print_json
     from etc_engine.errors import InputError
@@ -139,7 +138,7 @@ def solve_command(
         warn(digit_warnings(table, gap, bonded=asked.takes_gap))
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
     warn(box_warnings(table, driven, gap))
-    warn(excess_warnings(result.tensor, np.append(medium.conductivity, medium.pores.conductivity)))
+    warn(excess_warnings(result.tensor, medium.conductivity, medium.pores, result.model_error))
     if field is not None:
         write_outputs(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start

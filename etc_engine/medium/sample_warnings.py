@@ -9,9 +9,13 @@ from numpy.typing import ArrayLike
 
 from etc_engine.box import AXES
 from etc_engine.medium.network import ContactNetwork
+from etc_engine.medium.pores import VACUUM, Pores
 from etc_engine.particle_files.precision import doubtful_contacts
 from etc_engine.particle_files.table import ParticleTable
 from etc_engine.structure.filling import find_filling, free_walls
+
+EXCESS = 0.005
+"""An excess below this part is the error of a method that solves particles and pores of nearly equal conductivity."""
 
 
 def digit_warnings(table: ParticleTable, gap: float, *, bonded: bool) -> list[str]:
@@ -95,11 +99,29 @@ def box_warnings(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) 
     return found
 
 
-def excess_warnings(tensor: ArrayLike, conductivity: ArrayLike) -> list[str]:
-    """A sample conducts no better than its best part; where it does, the box or the contacts are wrong."""
-    best, most = float(np.max(conductivity)), float(np.nanmax(np.diag(np.atleast_2d(tensor))))
-    if most <= best * (1.0 + 1e-9):
+def excess_warnings(tensor: ArrayLike, conductivity: ArrayLike, pores: Pores = VACUUM, error: float = 0.0) -> list[str]:
+    """A sample conducts no better than its best part; where it does, the box, the contacts or the method are wrong.
+
+    Parameters
+    ----------
+    tensor : array_like, shape (d, d) [W/(m K)]
+    conductivity : array_like, shape (n,) [W/(m K)]
+        Of the particles.
+    pores : Pores
+        Radiation adds to the best conductor: with it there is no such limit.
+    error : float
+        Estimated relative error of the method; NaN if it has none.
+    """
+    best = max(float(np.max(conductivity)), pores.conductivity)
+    most = float(np.nanmax(np.diag(np.atleast_2d(tensor))))
+    slack = EXCESS if pores.conduct else 1e-9
+    if pores.radiation > 0.0 or most <= best * (1.0 + max(slack, float(np.nan_to_num(error)))):
         return []
+    if pores.conduct:
+        return [
+            f"the conductivity {most:.6g} W/(m K) exceeds that of the best conductor of the sample, {best:.6g}: the "
+            "method errs here, or walls go through particles, see --box"
+        ]
     return [
         f"the conductivity {most:.6g} W/(m K) exceeds that of the particles, {best:.6g}: walls or contacts go "
         "through particles, see --box and the contact rule"

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from etc_engine.engines.dtem.facet_bounds import held_between_bounds
 from etc_engine.engines.dtem.facet_elements import FacetMaterial, FacetSides
 from etc_engine.engines.dtem.facet_family import FEW_MATERIALS, FamilyMember, solve_family
 from etc_engine.engines.dtem.facet_nonlinear import MaterialAt
@@ -101,7 +102,8 @@ def sphere_conductivity(
     Returns
     -------
     EffectiveConductivity
-        Every axis is spanned, through the pores.
+        Every axis is spanned, through the pores. Not beyond the bounds of
+        `etc_engine.engines.dtem.facet_bounds.held_between_bounds`.
 
     Raises
     ------
@@ -117,7 +119,8 @@ def sphere_conductivity(
     4.44
     """
     links = links or medium_links(medium)
-    return facet_conductivity(links, medium_material(medium, links), tolerance=tolerance, axes=axes)
+    found = facet_conductivity(links, medium_material(medium, links), tolerance=tolerance, axes=axes)
+    return held_between_bounds(found, medium)
 
 
 def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result]:
@@ -138,7 +141,8 @@ def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result
             found.update(dict.fromkeys(rows, error))
             continue
         if len(rows) >= FEW_MATERIALS and conduction.options.get("material_curve", "reduced") == "reduced":
-            found.update(_family(media, rows, links, conduction))
+            family = _family(media, rows, links, conduction)
+            found |= {row: held_between_bounds(result, media[row]) for row, result in family.items()}
         for row in rows:
             if row not in found:
                 solve = partial(
@@ -154,7 +158,7 @@ def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result
 
 def _family(
     media: Sequence[Medium], rows: Sequence[int], links: FacetLinks, conduction: Conduction
-) -> dict[int, Result]:
+) -> dict[int, EffectiveConductivity[FacetSolution]]:
     """Results of the media that could be solved together."""
     axes, box, start = conduction.axes, links.packing.box, time.perf_counter()
     try:
