@@ -293,7 +293,8 @@ def accuracy_warnings(solution: FacetSolution) -> tuple[str, ...]:
     Few facets per sphere: in a simple cubic array the heat bends to second neighbours, with which a sphere shares no
     facet (-1 % at contrast 2, -5 .. -8 % at 10, -6 .. -13.5 % above). Wide gaps: at solid fractions of .2 to .5 cubic
     arrays are up to 5.7 % high, dilute random packings 3 % low. Spheres and fluid nearly alike: random packings are
-    up to 2.4 % low at contrast 1, where no bounds hold them (`held_between_bounds`). Spheres cut so deep that their matrices were mended.
+    up to 2.4 % low at contrast 1, where no bounds hold them (`held_between_bounds`). Spheres cut so deep that their
+    matrices were mended.
     """
     links, material = solution.links, solution.material
     contrast = float(np.median(material.conductivity) / max(float(np.median(material.open_fluid)), 1e-300))
@@ -323,8 +324,8 @@ def _alike_warning(contrast: float) -> str:
     if contrast >= ALIKE:
         return ""
     return (
-        f"at a contrast of {contrast:.3g} facet links alone are up to 2.4 % low: a continuum without contact resistances "
-        "is held at rigorous bounds and right; otherwise use method cell"
+        f"at a contrast of {contrast:.3g} facet links alone are up to 2.4 % low: with a continuum and no contact "
+        "resistances rigorous bounds hold them, otherwise use method cell"
     )
 
 
