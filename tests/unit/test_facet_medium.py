@@ -18,6 +18,7 @@ from etc_engine import (
 from etc_engine.engines.dtem.facet_medium import medium_links
 from etc_engine.errors import InputError
 from etc_engine.medium.conduction import Conduction
+from etc_engine.medium.conductivity import conductivities
 from etc_engine.medium.walls import FixedTemperature
 from etc_engine.realization.engines import field_along, find_engine
 from etc_engine.realization.transients import transient_system
@@ -86,7 +87,11 @@ def test_field_balances_and_lies_between_the_walls():
     np.add.at(out, links.wall_particles, field.wall_flows)
     flow = field.wall_flows[links.walls == 5].sum()
     assert np.abs(out).max() < 1e-7 * flow
-    assert flow == pytest.approx(result.tensor[2, 2] * 9.0 / 4.0, rel=1e-6)
+    # so loose a bed is held at a rigorous bound, its heat flows are not
+    own = conductivities(medium.box, (2,), result.solutions[0].energies)[0, 0]
+    assert own < result.tensor[2, 2]
+    assert flow == pytest.approx(own * 9.0 / 4.0, rel=1e-6)
+    assert "miss rigorous bounds by 7.9 %" in find_engine("dtem").remarks("facets", result)[-1]
     for values in (field.particle_temperatures, field.contact_temperatures, field.wall_temperatures):
         assert values.min() >= 0.0
         assert values.max() <= 1.0

@@ -11,7 +11,7 @@ the second order of the difference where the body is isotropic.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,35 @@ from etc_engine.arrays import Floats
 from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.medium import Medium
 from etc_engine.models.bounds import parallel, series
+
+NEAR = 1.1
+"""Below this many times the isotropic lower bound the components along all axes are needed to hold one of them."""
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """Wiener bounds of the principal values, the arithmetic mean, and the fluid [W/(m K)]."""
+
+    fluid: float
+    low: float
+    mean: float
+    high: float
+
+    @property
+    def inverse_sum(self) -> float:
+        """Upper bound of the sum of 1/(k_i - k_f) [m K/W]."""
+        return 1.0 / (self.low - self.fluid) + 2.0 / (self.mean - self.fluid)
+
+
+def needs_all_axes(result: EffectiveConductivity[Any], medium: Medium) -> bool:
+    """Whether the components along the other axes are needed to hold those that were asked for between the bounds.
+
+    Otherwise the conductivity along an axis would depend on which others are asked for.
+    """
+    bounds, along = _bounds(medium), np.diag(result.tensor)
+    if bounds is None or np.isfinite(along).all() or bounds.mean <= bounds.fluid:
+        return False
+    return bool(np.nanmin(along) < NEAR * (bounds.fluid + 3.0 / bounds.inverse_sum))
 
 
 def held_between_bounds(result: EffectiveConductivity[Any], medium: Medium) -> EffectiveConductivity[Any]:
@@ -40,45 +69,49 @@ def held_between_bounds(result: EffectiveConductivity[Any], medium: Medium) -> E
     Notes
     -----
     No bound holds with temperature jumps, radiation or contact resistances. Necks of prescribed contacts are solid
-    that the solid fraction does not count: with them the lower bound holds alone.
+    that the solid fraction does not count: with them the lower bounds hold alone.
 
     References
     ----------
     O. Wiener, Abh. Sächs. Ges. Wiss. 32, 507 (1912). K. A. Lurie and A. V. Cherkaev, Proc. R. Soc. Edinburgh A 99, 71
     (1984). F. Murat and L. Tartar, in Les méthodes de l'homogénéisation (1985), 319.
     """
-    network, pores = medium.network, medium.pores.conductivity
-    if not medium.pores.plain:
+    bounds, tensor = _bounds(medium), result.tensor
+    if bounds is None:
         return result
-    if network is not None and (network.resistances.any() or network.wall_resistances.any()):
-        return result
-    spheres, fraction = medium.conductivity, medium.solid_fraction
-    low, mean = (float(bound(pores, float(spheres.min()), fraction)) for bound in (series, parallel))
-    high = float(parallel(pores, float(spheres.max()), fraction))
-    if network is not None and not network.geometric and network.count + network.walls.size:
-        high = np.inf
-    tensor = result.tensor
     if not np.isfinite(np.diag(tensor)).all():
         held = tensor.copy()
-        np.fill_diagonal(held, np.clip(np.diag(tensor), low, high))
+        np.fill_diagonal(held, np.clip(np.diag(tensor), bounds.low, bounds.high))
         return replace(result, tensor=held)
     # between walls: of the cell and its mirror images, the components off the diagonal vanish
     principal, axes = np.linalg.eigh(np.nan_to_num(tensor))
-    clipped = np.clip(principal, low, high)
-    if mean > pores:
-        clipped += _lift(clipped - pores, low - pores, mean - pores)
+    clipped = np.clip(principal, bounds.low, bounds.high)
+    if bounds.mean > bounds.fluid:
+        clipped += _lift(clipped, bounds)
     if (clipped == principal).all():
         return result
     return replace(result, tensor=np.where(np.isnan(tensor), np.nan, (axes * clipped) @ axes.T))
 
 
-def _lift(excess: Floats, low: float, mean: float) -> float:
-    """What all principal values need more to meet the bound on the sum of their inverses, all less the fluid's."""
-    most = 1.0 / low + (excess.size - 1) / mean
+def _bounds(medium: Medium) -> _Bounds | None:
+    """The bounds of a medium; None where none hold."""
+    network, fluid = medium.network, medium.pores.conductivity
+    resists = network is not None and (network.resistances.any() or network.wall_resistances.any())
+    if not medium.pores.plain or resists:
+        return None
+    spheres, fraction = medium.conductivity, medium.solid_fraction
+    low, mean = (float(bound(fluid, float(spheres.min()), fraction)) for bound in (series, parallel))
+    necks = network is not None and not network.geometric and network.count + network.walls.size > 0
+    return _Bounds(fluid, low, mean, np.inf if necks else float(parallel(fluid, float(spheres.max()), fraction)))
+
+
+def _lift(principal: Floats, bounds: _Bounds) -> float:
+    """What all principal values need more to meet the bound on the sum of their inverses [W/(m K)]."""
 
     def over(lift: float) -> float:
-        return float((1.0 / (excess + lift)).sum()) - most
+        return float((1.0 / (principal + lift - bounds.fluid)).sum()) - bounds.inverse_sum
 
     if over(0.0) <= 0.0:
         return 0.0
-    return float(brentq(over, 0.0, mean, xtol=1e-15 * mean, rtol=1e-14))
+    most = bounds.mean - bounds.fluid
+    return float(brentq(over, 0.0, most, xtol=1e-15 * most, rtol=1e-14))
