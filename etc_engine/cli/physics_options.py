@@ -43,7 +43,11 @@ OPTIONS = (
     click.option("--pressure", type=float, help="Pressure of the gas [Pa]. 0 is vacuum."),
     click.option("--temperature", type=float, help="Temperature of properties and radiation [K]."),
     click.option("--accommodation", type=float, help="Thermal accommodation coefficient of the surfaces, up to 1."),
-    click.option("--emissivity", type=float, help="Emissivity of the particles. Facing surfaces radiate."),
+    click.option(
+        "--emissivity",
+        type=float,
+        help="Emissivity of the particles. Facing surfaces of neighbours radiate; rays past neighbours are left out.",
+    ),
     click.option(
         "--wall-temperatures",
         help="Temperatures of the walls at the low and the far end [K], 900:600: properties follow the local "
@@ -193,7 +197,7 @@ class PhysicsWords:
         for name in given:
             if name not in used:
                 raise InputError(f"{_option(name)} means nothing to the contact rule {word}")
-        if "bond_gap" in rule.keys:
+        if rule.takes_gap:
             given["bond_gap"] = bond_gap
         elastic = ("youngs_modulus", "poisson_ratio") if self.simulated_modulus is not None else ()
         for name in (*rule.needs, *elastic):

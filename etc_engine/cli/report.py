@@ -28,7 +28,9 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
         system_sizes,
     )
     from etc_engine.durable.files import replacing
+    from etc_engine.errors import EtcError
     from etc_engine.output.report import report_page
+    from etc_engine.sweep.packing import first_packing
     from etc_engine.sweep.result_file import open_dataset
 
     check_picture(output.with_suffix(".png"))
@@ -44,10 +46,18 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
         "convergence": figures.draw_convergence(running_statistics(dataset)),
         "histograms": figures.draw_histograms(samples(dataset)),
     }
+    absent = ""
+    try:
+        drawn["bed"] = figures.draw_bed(first_packing(dataset)[0])
+    except EtcError as error:
+        absent = str(error)
+    over_temperature = figures.draw_over_temperature(comparison)
+    if over_temperature is not None:
+        drawn["temperature"] = over_temperature
     if len(datasets) > 1:
         drawn["systems"] = figures.draw_system_sizes(systems)
     pictures = {name: figures.png(figure) for name, figure in drawn.items()}
-    page = report_page(dataset, comparison, fit_models(dataset), systems, pictures)
+    page = report_page(dataset, comparison, fit_models(dataset), systems, pictures, absent)
     with replacing(output) as file:
         file.write_text(page, encoding="utf-8")
     click.echo(f"{output}: {len(page) / 1e6:.1f} MB, {len(pictures)} figures")

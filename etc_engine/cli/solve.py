@@ -131,8 +131,9 @@ def solve_command(
         record["contact_temperatures"] = [{"particles": pair, "temperature": value} for pair, value in each]
     for remark in engine.remarks(method, result):
         click.echo(f"etc-engine: warning: {remark}", err=True)
-    if not medium.pores.conduct:
-        warn_of_missing_contacts(medium.links, asked, given=dumped.contacts is not None)
+    conduct, of_file = medium.pores.conduct, dumped.contacts is not None
+    if not conduct or of_file or asked.asks_for_contacts:
+        warn_of_missing_contacts(medium.links, asked, given=of_file, pores_conduct=conduct)
     gap = asked.gap(medium.links)
     if dumped.contacts is None and not asked.closest:  # of the closest pairs there are as many, whatever the digits
         warn(digit_warnings(table, gap, bonded=asked.takes_gap))

@@ -34,8 +34,11 @@ def trim_cropped_walls(medium: Medium, table: ParticleTable, axes: tuple[int, ..
     return medium.with_network(network)
 
 
-def warn_of_missing_contacts(network: ContactNetwork, asked: SolveRequest, *, given: bool) -> None:
-    """A packing without a single contact is most likely a misunderstanding about the contact rule, or their file."""
+def warn_of_missing_contacts(network: ContactNetwork, asked: SolveRequest, *, given: bool, pores_conduct: bool) -> None:
+    """A packing without a single contact is most likely a misunderstanding about the contact rule, or their file.
+
+    Where the pores conduct it is one only if contacts were asked for.
+    """
     from etc_engine.packing.neighbors import neighbor_pairs
 
     packing = network.packing
@@ -54,8 +57,9 @@ def warn_of_missing_contacts(network: ContactNetwork, asked: SolveRequest, *, gi
     else:
         instead = "--contact-angle" if asked.rule == "overlap" else f"--rule bonded or load instead of {asked.rule}"
         rule, remedy = "no particles overlap", f"touching particles conduct with {instead}"
+    effect = "heat crosses the pores alone, without a contact" if pores_conduct else "nothing conducts"
     click.echo(
-        f"etc-engine: warning: {rule}, so nothing conducts; the closest pair is {max(closest, 0.0):.2g} mean radii "
+        f"etc-engine: warning: {rule}, so {effect}; the closest pair is {max(closest, 0.0):.2g} mean radii "
         f"apart: {remedy}",
         err=True,
     )

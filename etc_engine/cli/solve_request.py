@@ -60,6 +60,11 @@ class SolveRequest:
         return self.contact_angle is not None or self.physics.contact_radius is not None
 
     @property
+    def asks_for_contacts(self) -> bool:
+        """Whether a width or a rule of contacts is given; without one there need not be any."""
+        return self.bonded or self.physics.contact_rule is not None
+
+    @property
     def rule(self) -> str:
         """The word of the contact rule."""
         return self.physics.rule_for(self.contact_angle)
@@ -69,7 +74,7 @@ class SolveRequest:
         """Whether the contact rule joins particles across a gap that the user gives."""
         from etc_engine.medium.rules import find_rule
 
-        return "bond_gap" in find_rule(self.rule).keys and not self.closest
+        return find_rule(self.rule).takes_gap and not self.closest
 
     @property
     def closest(self) -> bool:

@@ -127,7 +127,7 @@ def _warn_of_digits(study: NetworkStudy, done: Transient) -> None:
     for note in done.tables[0].notes if done.tables else ():
         click.echo(f"etc-engine: note: {note}", err=True)
     values = study.contacts.values()
-    bonded = "bond_gap" in find_rule(study.contacts.rule).keys
+    bonded = find_rule(study.contacts.rule).takes_gap
     for table in dict.fromkeys((done.tables[0], done.tables[-1]) if done.tables else ()):
         warn(digit_warnings(table, values.get("bond_gap", 0.0) if bonded else 0.0, bonded=bonded))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from etc_engine.errors import InputError
+from etc_engine.medium.rules import find_rule
 from etc_engine.realization import Status
 from etc_engine.study.files import SCHEMA
 from etc_engine.sweep.statistics import interval, student_t
@@ -122,11 +123,7 @@ def _unbound(rule: str, *, gas: bool, glow: bool) -> str:
         return "radiation crosses the pores beside what fills them"
     if gas:
         return "a gas may conduct less in narrow gaps than in wide ones"
-    if rule == "overlap":
-        return ""
-    if rule in ("hertz", "load"):
-        return "the width of the contacts follows from forces, not from the shape of the particles"
-    return "the contacts are bonds, wider than the shape of the particles makes them"
+    return find_rule(rule).unbound
 
 
 MANY = 6

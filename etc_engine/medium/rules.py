@@ -194,6 +194,10 @@ def coordination_contacts(packing: ParticlePacking, half_angle: float, coordinat
     return _bonded(closest_neighbors(packing, coordination), half_angle, "coordination")
 
 
+BONDS = "the contacts are bonds, wider than the shape of the particles makes them"
+FORCES = "the width of the contacts follows from forces, not from the shape of the particles"
+
+
 @dataclass(frozen=True)
 class Rule:
     """A contact rule by its word.
@@ -211,6 +215,12 @@ class Rule:
         Whether a contact depends on its two particles alone, no farther apart than overlap or ``bond_gap`` says.
     radii_may_grow : bool
         Whether packers may let particles overlap to reach a density: the rule takes its contacts from overlaps.
+    geometric : bool
+        Whether the shape of overlapping particles alone makes the contacts, so that other radii make other contacts.
+    roughness : bool
+        Whether the force of a contact is known, from which the resistance of rough surfaces follows.
+    unbound : str
+        Why rigorous bounds of two phases do not bind what the rule makes; empty if they do.
     """
 
     contacts: Callable[..., ContactNetwork]
@@ -219,6 +229,14 @@ class Rule:
     dimensions: tuple[int, ...] = (2, 3)
     radii_may_grow: bool = False
     local: bool = False
+    geometric: bool = False
+    roughness: bool = False
+    unbound: str = BONDS
+
+    @property
+    def takes_gap(self) -> bool:
+        """Whether the rule joins particles across a gap that a study gives."""
+        return "bond_gap" in self.keys
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -231,7 +249,7 @@ ELASTIC = {name: name for name in ("youngs_modulus", "poisson_ratio", *WALL)}
 """Elastic constants of the particles and of the walls, as a study and as a rule spells them."""
 
 RULES: Mapping[str, Rule] = {
-    "overlap": Rule(overlap_contacts, {}, radii_may_grow=True, local=True),
+    "overlap": Rule(overlap_contacts, {}, radii_may_grow=True, local=True, geometric=True, unbound=""),
     "bonded": Rule(bonded_contacts, {"contact_angle": "half_angle", "bond_gap": "bond_gap"}, local=True),
     "radius": Rule(radius_contacts, {"contact_radius": "contact_radius", "bond_gap": "bond_gap"}, local=True),
     "coordination": Rule(coordination_contacts, {"contact_angle": "half_angle", "coordination": "coordination"}),
@@ -240,11 +258,15 @@ RULES: Mapping[str, Rule] = {
         {**ELASTIC, "simulated_modulus": "simulated_modulus"},
         (*ELASTIC, "simulated_modulus"),
         radii_may_grow=True,
+        roughness=True,
+        unbound=FORCES,
     ),
     "load": Rule(
         load_contacts,
         {"load": "load", **ELASTIC, "bond_gap": "bond_gap", "coordination": "coordination"},
         (*WALL, "coordination"),
+        roughness=True,
+        unbound=FORCES,
     ),
 }
 

@@ -17,7 +17,7 @@ from etc_engine.comparison.closest import closest_words
 from etc_engine.comparison.sensitivity import sensitivities
 from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
-from etc_engine.study.quantities import SWEPT, heading_of, word_of
+from etc_engine.study.quantities import QUANTITIES, SWEPT, heading_of, word_of
 
 if TYPE_CHECKING:
     import xarray
@@ -52,6 +52,7 @@ def report_page(
     fits: Sequence[Fit],
     systems: xarray.Dataset,
     pictures: Mapping[str, bytes],
+    absent: str = "",
 ) -> str:
     """The HTML page of a sweep.
 
@@ -66,7 +67,10 @@ def report_page(
     systems : xarray.Dataset
         Statistics of the same study over ``system``: boxes of several sizes, or this one alone.
     pictures : mapping of str to bytes
-        PNG files: ``comparison``, ``convergence``, ``histograms`` and, with several systems, ``systems``.
+        PNG files: ``comparison``, ``convergence``, ``histograms``, ``bed`` where a packing could be made again,
+        ``temperature`` with several temperatures, and with several systems ``systems``.
+    absent : str
+        Why there is no picture of the bed.
 
     Returns
     -------
@@ -74,6 +78,7 @@ def report_page(
     """
     study = json.loads(dataset.attrs["study_resolved"])
     sections = (
+        ("bed", "Bed", _bed(dataset, study, pictures, absent)),
         ("conductivity", "Conductivity", _picture(pictures["comparison"], "mean conductivity and models")),
         ("statistics", "Statistics", _statistics(dataset, comparison)),
         ("models", "Models and bounds", _models(comparison) + _fits(fits)),
@@ -94,6 +99,26 @@ def report_page(
         f"<h1>{name}</h1><p class='faint'>Effective thermal conductivity over random realizations</p>"
         f"{_facts(dataset, comparison, study)}<nav>{links}</nav>\n{body}\n</body></html>\n"
     )
+
+
+def _bed(dataset: xarray.Dataset, study: Mapping[str, Any], pictures: Mapping[str, bytes], absent: str) -> str:
+    """A picture of the packing, and every condition of the study with its values."""
+    picture = (
+        _picture(pictures["bed"], "the packing of the first realization, made again from its random stream")
+        if "bed" in pictures
+        else f"<p class='faint'>No picture of the packing: {escape(absent)}.</p>"
+    )
+    rows = [
+        [heading_of(name, dataset[name].attrs), in_words(dataset[name].values)]
+        for name in QUANTITIES
+        if name in dataset.coords
+        and "realization" not in dataset[name].dims  # of contacts that were counted
+        and dataset[name].dtype.kind == "f"
+        and np.isfinite(dataset[name].values).all()
+    ]
+    named = [[key, words] for key, words in _conditions(study).items() if key in ("particles", "pores")]
+    curves = _picture(pictures["temperature"], "conductivity over the temperature") if "temperature" in pictures else ""
+    return picture + curves + "<p>Conditions:</p>" + _table(["quantity", "value"], named + rows, text_columns=(0, 1))
 
 
 def _packing(packing: Mapping[str, Any]) -> str:

@@ -262,7 +262,7 @@ def study_text(request: Request, study: Id) -> Response:
 
 @api.get("/studies/{study}/curve", responses={200: {"content": {"application/json": {}}}})
 async def study_curve(request: Request, study: Id) -> Response:
-    """Conductivity over density with confidence intervals and models: complete, or of the realizations so far."""
+    """Conductivity over the density, of one density over the temperature, with confidence intervals and models."""
     _entry(request, study)
     service = _service(request)
     if service.store.result(study).exists():

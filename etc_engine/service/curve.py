@@ -1,4 +1,4 @@
-"""The numbers of the figure: conductivity over density with confidence intervals, and the models beside it."""
+"""The numbers of the figure: conductivity with confidence intervals over a dimension, and the models beside it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from etc_engine.arrays import Floats
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.comparison.simulation import simulated
 from etc_engine.errors import InputError
-from etc_engine.study.quantities import word_of
+from etc_engine.study.quantities import QUANTITIES, heading_of, word_of
 
 if TYPE_CHECKING:
     import xarray
@@ -29,34 +29,52 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``confidence``, ``units``, ``density``, ``solid_fraction`` and ``series``: ``values`` of the other dimensions of
-        the sweep, in words too as ``name``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` over the densities.
+        ``confidence``, ``units``, ``density``, ``along``: the dimension drawn along the horizontal axis with its
+        ``title`` and ``values``, the density unless it has one value and the temperature, or another quantity, several.
+        ``solid_fraction`` over the densities and ``series``: ``values`` of the other dimensions of the sweep, in words
+        too as ``name``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` along that dimension.
         ``models`` with their curves, ``remark`` where there are none, ``bounds_broken``. A missing number
         is None.
     """
     units = int((dataset["worker_rank"].values >= 0).sum())
     found: dict[str, Any] = {"units": units, "confidence": float(dataset.attrs["confidence_level"])}
     found["density"] = plain(dataset["density"].values)
+    along = _horizontal(dataset)
+    title = heading_of(along, dataset[along].attrs)
+    found["along"] = {"name": along, "title": title, "values": plain(dataset[along].values)}
     found |= {"series": [], "models": [], "solid_fraction": [], "remark": "", "bounds_broken": False}
     if not units:
         return found
     statistics = simulated(dataset)
-    found["solid_fraction"] = plain(_over_density(statistics["solid_fraction"]))
-    found["series"] = [_series(statistics.isel(place), place) for place in _places(statistics)]
+    found["solid_fraction"] = plain(_over(statistics["solid_fraction"], "density"))
+    found["series"] = [
+        _series(statistics.isel(place), [name for name in place if name != "density"])
+        for place in _places(statistics, along)
+    ]
     try:
         comparison = evaluate_models(dataset)
     except InputError as error:
         found["remark"] = str(error)
         return found
-    found["models"] = _models(comparison)
+    found["models"] = _models(comparison, along)
     found["bounds_broken"] = bool(comparison.attrs["bound_broken"])
     found["best_model"] = str(comparison.attrs["best_model"])
     return found
 
 
-def _places(statistics: xarray.Dataset) -> list[dict[str, int]]:
+def _horizontal(dataset: xarray.Dataset) -> str:
+    """The dimension of the horizontal axis: the density, or where it has one value the temperature or the longest."""
+    if dataset.sizes["density"] > 1:
+        return "density"
+    several = {name: dataset.sizes[name] for name in QUANTITIES if dataset.sizes.get(name, 1) > 1}
+    if "temperature" in several:
+        return "temperature"
+    return max(several, key=lambda name: several[name], default="density")
+
+
+def _places(statistics: xarray.Dataset, along: str) -> list[dict[str, int]]:
     """One index for every curve."""
-    names = [str(name) for name in statistics["conductivity_mean"].dims if name != "density"]
+    names = [str(name) for name in statistics["conductivity_mean"].dims if name != along]
     sizes = [statistics.sizes[name] for name in names]
     return [dict(zip(names, place, strict=True)) for place in np.ndindex(*sizes)]
 
@@ -73,22 +91,27 @@ def _series(cell: xarray.Dataset, names: Iterable[str]) -> dict[str, Any]:
     }
 
 
-def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
+def _models(comparison: xarray.Dataset, along: str) -> list[dict[str, Any]]:
     """Every model: a smooth line, and how far it is from the simulation."""
-    lines = model_lines(comparison)
-    drawn = {
-        str(name): lines["model_conductivity"].sel(model=name).transpose(..., "density").values
-        for name in lines["model"].values
-    }
+    lines = model_lines(comparison) if along == "density" else None
+    drawn = (
+        {}
+        if lines is None
+        else {
+            str(name): lines["model_conductivity"].sel(model=name).transpose(..., "density").values
+            for name in lines["model"].values
+        }
+    )
     found = []
     for name in comparison["model"].values:
         one = comparison.sel(model=name)
         value = one["model_conductivity"]
-        if str(name) in drawn:
-            density, curves = lines["density"].values, drawn[str(name)].reshape(-1, lines.sizes["density"])
-        else:  # the contact mean field: values on the sweep only, a curve per cell
-            density = comparison["density"].values
-            curves = np.array([_over_density(value.isel(place)) for place in _places(comparison)])
+        if lines is not None and str(name) in drawn:
+            at, curves = lines["density"].values, drawn[str(name)].reshape(-1, lines.sizes["density"])
+        else:  # along another dimension, or the contact mean field: values on the sweep only, a curve per cell
+            at = comparison[along].values
+            places = [{k: v for k, v in place.items() if k in value.dims} for place in _places(comparison, along)]
+            curves = np.array([_over(value.isel(place).broadcast_like(comparison[along]), along) for place in places])
         squares = np.asarray(one["rms_relative_difference"].values, dtype=np.float64) ** 2
         found.append(
             {
@@ -96,7 +119,7 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
                 "title": str(one["model_title"].values),
                 "kind": str(one["model_kind"].values),
                 "note": str(one["model_note"].values),
-                "density": plain(density),
+                "at": plain(at),
                 "curves": plain(curves),
                 "rms_relative_difference": plain(np.sqrt(squares.mean())),
             }
@@ -104,9 +127,9 @@ def _models(comparison: xarray.Dataset) -> list[dict[str, Any]]:
     return found
 
 
-def _over_density(values: xarray.DataArray) -> Floats:
+def _over(values: xarray.DataArray, along: str) -> Floats:
     """The first curve of an array that may have several."""
-    other = {name: 0 for name in values.dims if name != "density"}
+    other = {name: 0 for name in values.dims if name != along}
     return np.asarray(values.isel(other).values, dtype=np.float64)
 
 

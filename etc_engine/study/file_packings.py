@@ -161,7 +161,7 @@ class FileStudy(Study):
         """Digits that do not decide on contacts, bare walls and cut particles of the first packing."""
         source = self.packing.source(0)
         table = source.read()
-        bonded = "bond_gap" in RULES[self.contacts.rule].keys
+        bonded = RULES[self.contacts.rule].takes_gap
         gap = min(self.values("bond_gap"), default=0.0) if bonded else 0.0
         walls = [] if self.pores_conduct[0] else [k for k, flag in enumerate(table.packing.box.periodic) if not flag]
         found = [*table.notes, *digit_warnings(table, gap, bonded=bonded), *box_warnings(table, walls, gap)]

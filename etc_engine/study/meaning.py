@@ -35,7 +35,10 @@ def _meanings() -> Iterator[tuple[str, Needs]]:
     for key in (row.key for row in QUANTITIES.values() if row.table == "contacts"):
         rules = {"contacts.rule": tuple(word for word, rule in RULES.items() if key in rule.keys)}
         yield f"contacts.{key}", {**networks, **(rules if key in of_rules else {})}
-    yield "contacts.roughness", {**networks, "contacts.rule": ("hertz", "load")}
+    yield (
+        "contacts.roughness",
+        {**networks, "contacts.rule": tuple(word for word, rule in RULES.items() if rule.roughness)},
+    )
     yield "particles.conductivity", {"particles.material": (NONE,)}
     yield "pores.conductivity", {"pores.gas": (NONE,)}
     for name in OPTIONS:

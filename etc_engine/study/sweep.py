@@ -75,9 +75,10 @@ class Study(StudyFile):
         if not engine.needs_contacts:
             self._check_cell()
         densest = max((density for density in self.densities if density is not None), default=0.0)
-        if self.contacts.rule == "bonded" and densest >= 1.0:
+        rule = self.contacts.rule
+        if engine.needs_contacts and not RULES[rule].radii_may_grow and densest >= 1.0:
             raise ValueError(
-                f"packing.density: found {densest}, allowed below 1 with rule = 'bonded': its particles do not overlap"
+                f"packing.density: found {densest}, allowed below 1 with rule = {rule!r}: its particles do not overlap"
             )
         return self
 

@@ -12,6 +12,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from etc_engine.errors import InputError, StudyError
 from etc_engine.materials import find_solid
 from etc_engine.medium.conditions import Conditions
+from etc_engine.medium.rules import RULES
 from etc_engine.medium.walls import WallCondition
 from etc_engine.realization import ENGINES
 from etc_engine.solvers.marching import NONLINEAR, SCHEMES
@@ -394,7 +395,7 @@ class NetworkStudy(StudyFile):
             raise ValueError("time.steps: with [motion] give the steps from frame to frame, or scheme = 'adaptive'")
         if self.conduction.dipoles:
             raise ValueError("conduction.dipoles: the rotation of a disk between frames is not known: remove it")
-        if motion.expansion != 0.0 and self.contacts.rule != "overlap":
+        if motion.expansion != 0.0 and not RULES[self.contacts.rule].geometric:
             raise ValueError("motion.expansion: radii change the contacts of rule = 'overlap' only")
 
 

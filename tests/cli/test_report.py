@@ -11,7 +11,8 @@ from html.parser import HTMLParser
 
 import pytest
 
-from etc_engine.sweep.result_file import write_dataset
+from etc_engine.sweep.packing import first_packing
+from etc_engine.sweep.result_file import open_dataset, write_dataset
 
 STUDY = """
 schema = 2
@@ -69,6 +70,20 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
+def test_the_report_shows_the_packing_of_its_first_realization(etc_engine, tmp_path):
+    (tmp_path / "study.toml").write_text(STUDY.replace("[0.55, 0.6, 0.65, 0.7]", "0.7").replace("= 4", "= 1"))
+    assert etc_engine("sweep", tmp_path / "study.toml", "-o", tmp_path / "out.nc").returncode == 0
+    dataset = open_dataset(tmp_path / "out.nc")
+    packing, density = first_packing(dataset)
+    assert density == float(dataset["packing_density"][0, 0])
+    assert packing.count == int(dataset["particles"][0, 0])
+    done = etc_engine("report", tmp_path / "out.nc", "-o", tmp_path / "report.html")
+    assert done.returncode == 0, done.stderr
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert 'alt="the packing of the first realization, made again from its random stream"' in text
+    assert ">contact half-angle [degree]<" in text and ">5, 10<" in text
+
+
 def test_the_page_holds_everything_itself(result, tmp_path, etc_engine):
     page = tmp_path / "report.html"
     done = etc_engine("report", result, "-o", page)
@@ -76,6 +91,7 @@ def test_the_page_holds_everything_itself(result, tmp_path, etc_engine):
     text = page.read_text(encoding="utf-8")
     parsed = Page(text)
     assert parsed.sections == [
+        "bed",
         "conductivity",
         "statistics",
         "models",

@@ -86,6 +86,25 @@ def test_what_touches_is_judged_by_the_rule(tmp_path, capfd):
     assert "nothing touches the driven wall" in error
 
 
+def test_contacts_asked_for_and_not_found_are_told_in_a_gas_too(tmp_path, capfd):
+    """Spheres a tenth of a radius apart: bonds are asked for, the gas alone conducts; without bonds nothing is said."""
+    file = tmp_path / "apart.csv"
+    file.write_text("x,y,z,radius\n0.25,0.25,0.25,0.2375\n0.75,0.25,0.25,0.2375\n")
+    words = ["solve", str(file), "--box", "1,0.5,0.5", "--periodic", "xyz", "--pore-conductivity", "0.1", "--json"]
+    assert run([*words, "--contact-angle", "5"]) == 0
+    done = capfd.readouterr()
+    assert json.loads(done.out)["contacts"] == 0
+    assert "no surfaces are within 1e-06 mean radii, so heat crosses the pores alone" in done.err
+    assert run(words) == 0
+    assert "no surfaces" not in capfd.readouterr().err
+    assert "rays past neighbours are left out" in " ".join(help_of(capfd).split())
+
+
+def help_of(capfd):
+    assert run(["solve", "--help"]) == 0
+    return capfd.readouterr().out
+
+
 def test_the_help_names_every_method(capfd):
     assert run(["solve", "--help"]) == 0
     words = capfd.readouterr().out.replace(",", " ").replace(".", " ").split()

@@ -171,7 +171,7 @@ def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
         "name": "5°",
     }
     models = [
-        {"name": name, "title": name, "density": [0.5, 0.6], "curves": [values]}
+        {"name": name, "title": name, "at": [0.5, 0.6], "curves": [values]}
         for name, values in (
             ("near", [3.0, 4.0]),
             ("far", [90.0, 99.0]),
@@ -179,7 +179,8 @@ def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
             ("hidden", [0.5, 0.6]),
         )
     ]
-    curve = {"confidence": 0.95, "density": [0.5, 0.6], "series": [{"mean": [1.0, 2.0], **flat}], "models": models}
+    along = {"title": "density", "values": [0.5, 0.6]}
+    curve = {"confidence": 0.95, "along": along, "series": [{"mean": [1.0, 2.0], **flat}], "models": models}
     series = "5°"
     assert browser.run(DRAW, curve, [])[0] == [series]
     assert max(browser.run(DRAW, curve, [])[1]) < 3

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from etc_engine import Medium, effective_conductivity
+from etc_engine import Box, Medium, ParticlePacking, effective_conductivity
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.comparison.sensitivity import sensitivities
 from etc_engine.comparison.simulation import simulated
 from etc_engine.engines.dtem.between_walls import conductivity_between_walls
-from etc_engine.errors import StudyError
+from etc_engine.errors import InputError, StudyError
 from etc_engine.materials import find_solid, gas_state, jump_length
 from etc_engine.medium.conditions import Conditions, pores_at
 from etc_engine.medium.local import LocalProperties, solid_law
-from etc_engine.medium.rules import find_rule
+from etc_engine.medium.rules import RULES, find_rule
 from etc_engine.models import evaluate
+from etc_engine.output.figures import draw_bed, draw_over_temperature
 from etc_engine.packing import pack
+from etc_engine.particle_files.formats import read_particles
 from etc_engine.realization.realize import realize
+from etc_engine.service.curve import curve_of
 from etc_engine.study.conditions import derived_conductivities
-from etc_engine.study.sweep import parse_study
+from etc_engine.study.sweep import parse_study, study_of
 from etc_engine.sweep.dataset import assemble
+from etc_engine.sweep.packing import first_packing
 from etc_engine.sweep.table import tabulate
 
 BED = """
@@ -294,3 +299,113 @@ def test_what_walls_of_two_temperatures_need(old, new, message):
     with pytest.raises(StudyError) as caught:
         parse_study(WALLS.replace(old, new))
     assert message in str(caught.value)
+
+
+BINARY = """
+schema = 2
+name = "binary bed"
+seed = 5
+[packing]
+files = "bed.dump"
+[particles]
+types = { 1 = "alumina", 2 = "SS316", 3 = 5.0 }
+[contacts]
+rule = "bonded"
+contact_angle = 3.0
+bond_gap = 0.03
+[pores]
+gas = "helium"
+pressure = [1e3, 1e5]
+accommodation = 0.4
+[radiation]
+emissivity = 0.7
+[conduction]
+temperature = 600.0
+"""
+
+
+def written_binary(path, types=(1, 1, 1, 1, 2, 3, 3, 3)):
+    """Four large spheres on a face-centred lattice, small ones of a third of the radius between them."""
+    a, large = 4e-3, float(0.99 * 4e-3 / (2.0 * np.sqrt(2.0)))
+    x = a * (np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) / 2.0 + 0.25)
+    holes = a * (np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]) / 2.0 + 0.25)
+    head = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n8\nITEM: BOX BOUNDS pp pp pp\n{3 * f'0 {a!r}{chr(10)}'}"
+    rows = [
+        f"{k + 1} {types[k]} {p[0]!r} {p[1]!r} {p[2]!r} {large if k < 4 else large / 3.0!r}"
+        for k, p in enumerate(np.concatenate([x, np.mod(holes, a)]).tolist())
+    ]
+    path.write_text(head + "ITEM: ATOMS id type x y z radius\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def test_a_binary_bed_of_three_materials_in_gas(tmp_path):
+    """Two sizes, two solids by name and one by number, at two pressures: each against a medium made by hand."""
+    pytest.importorskip("CoolProp")
+    file = written_binary(tmp_path / "bed.dump")
+    study = study_of(tomllib.loads(BINARY), "bed.toml", tmp_path)
+    assert study.methods == ("facets",) and list(study.axes) == ["pressure"]
+    spec = study.for_realization(study.realization_spec(None), 0)
+    found = [float(np.trace(cell.conductivity)) / 3.0 for cell in realize(spec, np.random.default_rng(1)).cells]
+    packing = read_particles(file).packing
+    assert len(set(packing.radii.tolist())) == 2
+    kappa = [float(find_solid(name).conductivity.at(600.0)) for name in ("alumina", "SS316")]
+    each = np.array([kappa[0]] * 4 + [kappa[1]] + [5.0] * 3)
+    network = find_rule("bonded").contacts(packing, half_angle=np.radians(3.0), bond_gap=0.03)
+    assert network.count == 24
+    for pressure, value in zip((1e3, 1e5), found, strict=True):
+        pores = pores_at(Conditions(600.0, "helium", pressure, 0.4, emissivity=0.7), packing)
+        by_hand = effective_conductivity(Medium(packing, each, network, pores), method="facets").mean
+        assert value == pytest.approx(by_hand, rel=1e-12)
+    assert found[1] > 1.2 * found[0]
+    written_binary(file, types=(2, 2, 2, 2, 1, 3, 3, 3))  # the other solid in the large spheres
+    study = study_of(tomllib.loads(BINARY), "bed.toml", tmp_path)
+    spec = study.for_realization(study.realization_spec(None), 0)
+    other = [float(np.trace(cell.conductivity)) / 3.0 for cell in realize(spec, np.random.default_rng(1)).cells]
+    assert (other[1] > found[1]) == (kappa[1] > kappa[0])
+
+
+def test_rules_say_what_they_are():
+    """What other rooms ask of a rule stands in its row."""
+    assert [word for word, rule in RULES.items() if rule.geometric] == ["overlap"]
+    assert [word for word, rule in RULES.items() if rule.roughness] == ["hertz", "load"]
+    assert [word for word, rule in RULES.items() if rule.takes_gap] == ["bonded", "radius", "load"]
+    assert [word for word, rule in RULES.items() if not rule.unbound] == ["overlap"]
+    crowded = DISKS.replace('"hertz"', '"coordination"\ncontact_angle = 5.0\ncoordination = 4.0')
+    with pytest.raises(StudyError, match=r"allowed below 1 with rule = 'coordination'"):
+        parse_study(crowded.replace("density = 0.85", "density = 1.1"))
+
+
+def test_a_bed_is_drawn_over_the_temperature_at_each_pressure(made_sweep):
+    """On the page of the service, and in the report: packing, conditions, k(T) with the model of a bed."""
+    pytest.importorskip("CoolProp")
+    data = made_sweep(BED, lambda _, values, *__: 1e-3 * values["pressure"] ** 0.25 * values["temperature"])
+    curve = curve_of(data)
+    assert curve["along"] == {"name": "temperature", "title": "temperature [K]", "values": [400.0, 800.0]}
+    assert [series["values"] for series in curve["series"]] == [{"pressure": 1e3}, {"pressure": 1e5}]
+    np.testing.assert_allclose(curve["series"][1]["mean"], [1e-3 * 1e5**0.25 * t for t in (400.0, 800.0)])
+    comparison = evaluate_models(data)
+    model = next(one for one in curve["models"] if one["name"] == "zehner_bauer_schluender")
+    assert model["at"] == [400.0, 800.0]
+    expected = comparison["model_conductivity"].sel(model="zehner_bauer_schluender").isel(density=0)
+    np.testing.assert_allclose(model["curves"], expected.transpose("pressure", "temperature"))
+    figure = draw_over_temperature(comparison)
+    assert figure is not None
+    axes = figure.axes[0]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["1000 Pa", "1e+05 Pa"]
+    solid = [line.get_ydata() for line in axes.lines if line.get_linestyle() == "-"]
+    np.testing.assert_allclose(solid, comparison["conductivity_mean"].isel(density=0))
+    assert draw_over_temperature(comparison.isel(temperature=[0])) is None
+    with pytest.raises(InputError, match="makes another packing"):  # the conductivities are made up, so are packings
+        first_packing(data)
+
+
+@pytest.mark.parametrize("radii", [[0.2, 0.2], [0.2, 0.1]])
+def test_the_view_of_a_bed(radii):
+    """Spheres where they are, a scale of radii where they differ; a disk packing is drawn in its box."""
+    spheres = ParticlePacking([[0.3, 0.3, 0.3], [0.7, 0.7, 0.7]], radii, Box((1.0, 1.0, 1.0), (True, False, True)))
+    figure = draw_bed(spheres)
+    image = figure.axes[0].images[0].get_array()
+    assert 0.02 < float((image[..., 3] > 0.0).mean()) < 0.5
+    assert len(figure.axes) == (2 if radii[0] != radii[1] else 1)
+    disks = ParticlePacking([[0.3, 0.3], [0.7, 0.7]], radii, Box((1.0, 1.0)))
+    assert "2 disks" in draw_bed(disks).axes[0].get_title()

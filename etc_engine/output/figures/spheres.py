@@ -53,7 +53,7 @@ def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
     left.set_title(f"slice at {AXES[normal]} = {place:.3g} m", fontsize=9)
     view, frame = draw_view(packing, COLOURS(scale(np.ma.masked_invalid(field.particle_temperatures))), PIXELS)
     right.imshow(view, extent=frame, interpolation="bilinear", zorder=2)
-    _draw_edges(right, packing)
+    draw_edges(right, packing)
     right.margins(0.04)
     right.set_axis_off()
     right.set_title("mean temperature of each sphere", fontsize=9, pad=14)
@@ -163,7 +163,7 @@ def _images(packing: ParticlePacking) -> Floats:
     return np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def _screen() -> Floats:
+def screen_axes() -> Floats:
     """Unit vectors to the right and up the picture, shape (2, 3), z upright."""
     right = np.cross([0.0, 0.0, 1.0], TOWARDS)
     right /= np.linalg.norm(right)
@@ -190,7 +190,7 @@ def draw_view(
     frame : tuple of float
         Left, right, bottom and top of the image in projected coordinates [m].
     """
-    screen = _screen()
+    screen = screen_axes()
     flat, depth = packing.centers @ screen.T, packing.centers @ TOWARDS
     corners = box_corners(packing) @ screen.T
     low = np.minimum((flat - packing.radii[:, None]).min(axis=0), corners.min(axis=0))
@@ -234,9 +234,9 @@ def box_corners(packing: ParticlePacking) -> Floats:
     return np.stack(np.meshgrid(*([0.0, length] for length in packing.box.lengths), indexing="ij"), -1).reshape(-1, 3)
 
 
-def _draw_edges(axes: Axes, packing: ParticlePacking) -> None:
+def draw_edges(axes: Axes, packing: ParticlePacking) -> None:
     """The three edges of the box that meet behind the bed, dashed where they bound a periodic side."""
-    screen, lengths = _screen(), np.asarray(packing.box.lengths)
+    screen, lengths = screen_axes(), np.asarray(packing.box.lengths)
     back = np.where(TOWARDS > 0.0, 0.0, lengths)
     for axis in range(3):
         other = back.copy()

@@ -247,8 +247,8 @@ function study(id) {
     const cell = (series, i) => series.mean[i] === null ? "–" : series.mean[i].toPrecision(4) +
       (series.low[i] === null ? "" : ` ± ${(0.5 * (series.high[i] - series.low[i])).toPrecision(2)}`) + ` (${series.count[i]})`;
     table.replaceChildren(h("table", {}, h("caption", { class: "faint" }, "W/(m K), in brackets the realizations"),
-      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "density"), head)),
-      h("tbody", {}, curve.density.map((x, i) => h("tr", {}, h("th", { scope: "row" }, x === null ? "own" : String(+x.toPrecision(6))),
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, curve.along.title), head)),
+      h("tbody", {}, curve.along.values.map((x, i) => h("tr", {}, h("th", { scope: "row" }, x === null ? "own" : String(+x.toPrecision(6))),
         curve.series.map(series => h("td", {}, cell(series, i))))))));
   }
   function fillModels(curve) {

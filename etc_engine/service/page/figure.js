@@ -1,5 +1,5 @@
 "use strict";
-// The figure of conductivity over density: bands of confidence, means with marks, and models as dashed lines.
+// The figure of conductivity over the density, or another quantity: bands of confidence, means with marks, and models as dashed lines.
 
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#b65c93", "#c58a00", "#3a93c9"]; // told apart by the colour-blind
@@ -47,7 +47,7 @@ function upright(curve, models, across) {
 // What a model has between the ends of the horizontal axis.
 function seen(model, across) {
   return model.curves.flatMap(values => values.filter((value, i) =>
-    value !== null && model.density[i] !== null && model.density[i] >= across[0] && model.density[i] <= across[1]));
+    value !== null && model.at[i] !== null && model.at[i] >= across[0] && model.at[i] <= across[1]));
 }
 
 function absence(model, across, up) {
@@ -69,9 +69,9 @@ function mark(shape, x, y, colour) {
 const seriesName = series => series.name || "simulation";
 
 // Runs of neighbouring points for which all the given values are there.
-function runs(density, ...lists) {
+function runs(places, ...lists) {
   const found = [[]];
-  density.forEach((x, i) => {
+  places.forEach((x, i) => {
     if (x !== null && lists.every(list => list[i] !== null)) found[found.length - 1].push(i);
     else if (found[found.length - 1].length) found.push([]);
   });
@@ -81,7 +81,7 @@ function runs(density, ...lists) {
 // Answers the SVG and the entries of its legend; a narrow page gets a narrow figure, whose letters stay readable.
 function figure(curve, shownModels, room) {
   const WIDTH = room < 600 ? 520 : 900;
-  const across = range(curve.density, 0.04, 0.05);
+  const places = curve.along.values, across = range(places, 0.04, 0.05);
   const drawn = curve.models.filter(model => shownModels.has(model.name));
   const up = upright(curve, drawn, across);
   const X = x => LEFT + (x - across[0]) / (across[1] - across[0]) * (WIDTH - LEFT - RIGHT);
@@ -89,7 +89,7 @@ function figure(curve, shownModels, room) {
   const at = (x, y) => `${X(x).toFixed(2)} ${Y(y).toFixed(2)}`;
   const level = Math.round(100 * curve.confidence);
   const svg = draw("svg", { class: "curve", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img",
-    "aria-label": `Effective conductivity over density with ${level} % confidence bands; the values are in the table below` });
+    "aria-label": `Effective conductivity over ${curve.along.title} with ${level} % confidence bands; the values are in the table below` });
   const clip = draw("clipPath", { id: "plot" },
     draw("rect", { x: LEFT, y: TOP, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP - BOTTOM }));
   svg.append(draw("defs", {}, clip));
@@ -103,7 +103,7 @@ function figure(curve, shownModels, room) {
       draw("text", { x: LEFT - 9, y: Y(y) + 4, "text-anchor": "end" }, y.toFixed(vertical.digits)));
   }
   svg.append(draw("rect", { class: "frame", x: LEFT, y: TOP, width: WIDTH - LEFT - RIGHT, height: HEIGHT - TOP - BOTTOM }),
-    draw("text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, "text-anchor": "middle" }, "density"),
+    draw("text", { x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, "text-anchor": "middle" }, curve.along.title),
     draw("text", { x: 0, y: 0, transform: `translate(18 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)`, "text-anchor": "middle" },
       "effective conductivity [W/(m K)]"));
   const plot = draw("g", { "clip-path": "url(#plot)" });
@@ -112,8 +112,8 @@ function figure(curve, shownModels, room) {
   drawn.forEach((model, number) => {
     const dash = DASHES[number % DASHES.length];
     for (const values of model.curves) {
-      for (const run of runs(model.density, values)) {
-        const d = "M" + run.map(i => at(model.density[i], values[i])).join("L");
+      for (const run of runs(model.at, values)) {
+        const d = "M" + run.map(i => at(model.at[i], values[i])).join("L");
         plot.append(draw("path", { class: "model", d, "stroke-dasharray": dash }));
       }
     }
@@ -122,17 +122,17 @@ function figure(curve, shownModels, room) {
   });
   curve.series.forEach((series, number) => {
     const colour = COLOURS[number % COLOURS.length], name = seriesName(series);
-    for (const run of runs(curve.density, series.low, series.high)) {
-      const low = run.map(i => at(curve.density[i], series.low[i]));
-      const high = run.map(i => at(curve.density[i], series.high[i])).reverse();
+    for (const run of runs(places, series.low, series.high)) {
+      const low = run.map(i => at(places[i], series.low[i]));
+      const high = run.map(i => at(places[i], series.high[i])).reverse();
       const d = `M${[...low, ...high].join("L")}Z`;
       plot.append(draw("path", { class: "band", d, fill: colour, "fill-opacity": 0.17, stroke: "none" }));
     }
-    for (const run of runs(curve.density, series.mean)) {
-      const d = "M" + run.map(i => at(curve.density[i], series.mean[i])).join("L");
+    for (const run of runs(places, series.mean)) {
+      const d = "M" + run.map(i => at(places[i], series.mean[i])).join("L");
       plot.append(draw("path", { d, fill: "none", stroke: colour, "stroke-width": 1.8 }));
       for (const i of run) {
-        const x = X(curve.density[i]);
+        const x = X(places[i]);
         if (series.low[i] !== null) {
           const y1 = Y(series.low[i]), y2 = Y(series.high[i]);
           plot.append(draw("path", { class: "bar", d: `M${x - 4} ${y1}h8M${x - 4} ${y2}h8M${x} ${y1}V${y2}`, stroke: colour, fill: "none" }));
