@@ -50,10 +50,22 @@ class PackingSource:
         InputError, GeometryError
             If the file is gone, is another one than when the collection was made, or is not understood.
         """
+        self.check()
+        return read_particles(self.path, sample=self.chosen())
+
+    def check(self) -> None:
+        """Refuse a file that is another one than when the collection was made.
+
+        Raises
+        ------
+        InputError
+        """
         if file_digest(self.path) != self.digest:
             raise InputError(f"{self.path} has changed since the sweep began: keep the files of a sweep as they are")
-        several = count_frames(self.path) > 1
-        return read_particles(self.path, sample=replace(self.sample, frame=self.frame if several else None))
+
+    def chosen(self) -> Sample:
+        """The sample, with the frame where the file has several."""
+        return replace(self.sample, frame=self.frame if count_frames(self.path) > 1 else None)
 
 
 def find_sources(

@@ -5,9 +5,10 @@ A text file is cut at bytes: a rank takes the lines that begin between its two c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -16,14 +17,14 @@ from etc_engine.particle_files.columns import ColumnReader, Layout, batches, fin
 from etc_engine.particle_files.csv_files import content_lines, part_of_table, table_header, table_layout
 from etc_engine.particle_files.dumps import choose_frame, frame_table, sorted_rows
 from etc_engine.particle_files.formats import CSV, DUMP, NETCDF, format_to_read
-from etc_engine.particle_files.items import Frame, blocks_at, frames_of
+from etc_engine.particle_files.items import blocks_at, frames_of
 from etc_engine.particle_files.netcdf import check_netcdf, netcdf_part
 from etc_engine.particle_files.sample import Rows, Sample
 from etc_engine.particle_files.streams import GZIP, ZSTANDARD
-from etc_engine.ranks import Ranks, together
+from etc_engine.ranks import Alone, Ranks, together
 
 PIECE = 1 << 24
-"""Bytes that are searched for frames at once."""
+"""Bytes that are searched, or read, at once."""
 WANTED = ("conductivity",)
 """Columns beside positions and radii that are kept."""
 
@@ -51,97 +52,163 @@ def read_part(path: Path, sample: Sample, ranks: Ranks) -> Rows:
         On every rank, if the file is missing, not understood on one of them, or of a format that is read whole.
     """
 
-    def reader() -> Callable[[Path, Sample, Ranks], Rows]:
-        if not path.is_file():
-            raise InputError(f"there is no file {path} that many ranks can read")
-        with path.open("rb") as stream:
-            opening = stream.read(4)
-        if opening.startswith((GZIP, ZSTANDARD)):
-            raise InputError(f"{path} is compressed, and cannot be read in parts by many ranks: decompress it first")
-        kind = format_to_read(path)
-        if kind.name not in READERS:
-            raise InputError(
-                f"{path} is a {kind.name}, which is read whole: --distributed takes {', '.join(READERS)}; rewrite it"
-            )
-        if sample.frame is not None and not kind.has_frames:
-            raise InputError(f"{path} is a {kind.name}, which holds one packing: leave the frame out")
-        return READERS[kind.name]
-
-    return together(ranks, reader)(path, sample, ranks)
-
-
-def _dump_part(path: Path, sample: Sample, ranks: Ranks) -> Rows:
-    """Part of one frame of a text dump."""
-    number = -1 if sample.frame is None else sample.frame
-    size = path.stat().st_size
-    found = together(ranks, lambda: _item_starts(path, *_cuts(0, size, ranks)))
+    reader = together(ranks, lambda: _find_reader(path, sample, check=ranks.rank == 0))
+    found = together(ranks, lambda: _frame_marks(path, reader, ranks.rank, ranks.size))
     starts = [start for each in ranks.share(found) for start in each]
 
-    def read() -> tuple[Frame, Rows, int, int]:
-        frames = frames_of(path, blocks_at(path, starts, size))
-        frame, scale = choose_frame(path, frames, number)
-        place, block, count = frame_table(path, frame)
-        reader = ColumnReader(place, _slim(find_layout(place, block.words, sample.radius_column)))
-        lines = (line.decode("utf-8", errors="replace") for line in _lines(path, *_cuts(block.start, block.end, ranks)))
-        last = ""
+    def read() -> tuple[Rows, int | None]:
+        table = reader(path, sample, starts)
+        return table.read(ranks.rank, ranks.size), table.announced
+
+    rows, announced = together(ranks, read)
+    total = sum(ranks.share(rows.radii.size))
+    _check_total(rows.place, announced, total)
+    return rows
+
+
+def read_extremes(path: Path, sample: Sample) -> Rows:
+    """Two rows that stand for all rows of a file, as `extremes` makes them, read piece by piece by one process.
+
+    Parameters
+    ----------
+    path, sample
+        As of `read_part`.
+
+    Returns
+    -------
+    Rows
+        Its ``conductivity`` is not None where the file has such a column.
+
+    Raises
+    ------
+    InputError
+    """
+    reader = _find_reader(path, sample, check=True)
+    table = reader(path, sample, _frame_marks(path, reader, 0, 1))
+    pieces = 1 + path.stat().st_size // PIECE
+    rows, total = None, 0
+    for number in range(pieces):
+        piece = table.read(number, pieces)
+        total += piece.radii.size
+        if piece.radii.size:
+            rows = extremes(piece if rows is None else _joined(rows, piece), Alone())
+            rows = replace(rows, conductivity=None if piece.conductivity is None else np.zeros(2))
+    _check_total(str(path), table.announced, total)
+    assert rows is not None
+    return rows
+
+
+def _joined(rows: Rows, piece: Rows) -> Rows:
+    return replace(
+        piece,
+        positions=np.concatenate([rows.positions, piece.positions]),
+        radii=np.concatenate([rows.radii, piece.radii]),
+    )
+
+
+@dataclass(frozen=True)
+class _Table:
+    """A table that is read in parts.
+
+    Parameters
+    ----------
+    read : callable
+        (number of the part, of how many) -> its rows.
+    announced : int or None
+        Rows that the file says it has.
+    """
+
+    read: Callable[[int, int], Rows]
+    announced: int | None = None
+
+
+Reader = Callable[[Path, Sample, Sequence[int]], _Table]
+"""(path, sample, bytes at which lines begin with ``ITEM:``) -> table."""
+
+
+def _find_reader(path: Path, sample: Sample, *, check: bool) -> Reader:
+    """How a file is read in parts; one that is read whole is refused, and where ``check`` a damaged netCDF file."""
+    if not path.is_file():
+        raise InputError(f"there is no file {path} that many ranks can read")
+    with path.open("rb") as stream:
+        opening = stream.read(4)
+    if opening.startswith((GZIP, ZSTANDARD)):
+        raise InputError(f"{path} is compressed, and cannot be read in parts by many ranks: decompress it first")
+    kind = format_to_read(path)
+    if kind.name not in READERS:
+        raise InputError(f"{path} is a {kind.name}, which is read whole: many ranks read {', '.join(READERS)}")
+    if sample.frame is not None and not kind.has_frames:
+        raise InputError(f"{path} is a {kind.name}, which holds one packing: leave the frame out")
+    if check and kind is NETCDF:
+        check_netcdf(path)
+    return READERS[kind.name]
+
+
+def _check_total(place: str, announced: int | None, found: int) -> None:
+    if announced is not None and found != announced:
+        raise InputError(f"{place} is cut short or malformed: {announced} particles are announced, {found} found")
+    if found == 0:
+        raise InputError(f"{place} holds no particles, only a header")
+
+
+def _dump_table(path: Path, sample: Sample, starts: Sequence[int]) -> _Table:
+    """One frame of a text dump."""
+    frames = frames_of(path, blocks_at(path, starts, path.stat().st_size))
+    frame, scale = choose_frame(path, frames, -1 if sample.frame is None else sample.frame)
+    place, block, count = frame_table(path, frame)
+    layout = _slim(find_layout(place, block.words, sample.radius_column))
+
+    def read(part: int, parts: int) -> Rows:
+        reader, last = ColumnReader(place, layout), ""
+        raw = _lines(path, *_cuts(block.start, block.end, part, parts))
+        lines = (line.decode("utf-8", errors="replace") for line in raw)
         for batch in batches(line for line in lines if line.strip()):
             reader.feed(batch)
             last = batch[-1]
-        if ranks.rank == ranks.size - 1 and last and not last.endswith("\n"):
+        if last and not last.endswith("\n"):
             raise InputError(
                 f"{path}: frame {frame.number} is cut short or malformed: its last line has no end, "
                 "so a number may have lost digits"
             )
-        return frame, sorted_rows(place, frame, reader, scale), count, reader.rows
+        return sorted_rows(place, frame, reader, scale)
 
-    frame, rows, announced, own = together(ranks, read)
-    total = sum(ranks.share(own))
-    if total != announced:
-        raise InputError(
-            f"{path}: frame {frame.number} is cut short or malformed: {announced} particles are announced, "
-            f"{total} found"
-        )
-    return rows
+    return _Table(read, count)
 
 
-def _csv_part(path: Path, sample: Sample, ranks: Ranks) -> Rows:
-    """Part of a table of text with a header."""
+def _csv_table(path: Path, sample: Sample, _: Sequence[int]) -> _Table:
+    """A table of text with a header."""
+    raw: list[bytes] = []
 
-    def read() -> Rows:
-        with path.open("rb") as stream:
-            raw: list[bytes] = []
+    def kept(stream: BinaryIO) -> Iterator[bytes]:
+        for line in stream:
+            raw.append(line)
+            yield line
 
-            def kept() -> Iterator[bytes]:
-                for line in stream:
-                    raw.append(line)
-                    yield line
+    with path.open("rb") as stream:
+        line, header = next(content_lines(path, kept(stream)), (0, ""))
+    if not header:
+        raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
+    names, separator = table_header(path, line, header)
+    layout = _slim(table_layout(path, names, sample.radius_column))
+    start, end = sum(map(len, raw)), path.stat().st_size
 
-            line, header = next(content_lines(path, kept()), (0, ""))
-            if not header:
-                raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
-        names, separator = table_header(path, line, header)
-        layout = _slim(table_layout(path, names, sample.radius_column))
-        cuts = _cuts(sum(map(len, raw)), path.stat().st_size, ranks)
-        return part_of_table(path, layout, separator, content_lines(path, _lines(path, *cuts)))
+    def read(part: int, parts: int) -> Rows:
+        lines = _lines(path, *_cuts(start, end, part, parts))
+        return part_of_table(path, layout, separator, content_lines(path, lines))
 
-    rows = together(ranks, read)
-    if not sum(ranks.share(rows.radii.size)):
-        raise InputError(f"{path} holds no particles, only a header")
-    return rows
+    return _Table(read)
 
 
-def _netcdf_part(path: Path, _: Sample, ranks: Ranks) -> Rows:
-    """Part of a netCDF file."""
-    together(ranks, lambda: check_netcdf(path) if ranks.rank == 0 else None)
-    rows = together(ranks, lambda: netcdf_part(path, ranks.rank, ranks.size))
-    return replace(rows, ids=None, types=None)
+def _netcdf_table(path: Path, _: Sample, __: Sequence[int]) -> _Table:
+    """A netCDF file."""
+
+    def read(part: int, parts: int) -> Rows:
+        return replace(netcdf_part(path, part, parts), ids=None, types=None)
+
+    return _Table(read)
 
 
-READERS: Mapping[str, Callable[[Path, Sample, Ranks], Rows]] = {
-    DUMP.name: _dump_part,
-    CSV.name: _csv_part,
-    NETCDF.name: _netcdf_part,
-}
+READERS: Mapping[str, Reader] = {DUMP.name: _dump_table, CSV.name: _csv_table, NETCDF.name: _netcdf_table}
 """How each format is read in parts; the others are read whole."""
 
 
@@ -150,9 +217,9 @@ def _slim(layout: Layout) -> Layout:
     return replace(layout, others={name: column for name, column in layout.others.items() if name in WANTED})
 
 
-def _cuts(start: int, end: int, ranks: Ranks) -> tuple[int, int]:
-    """The bytes between ``start`` and ``end`` that belong to this rank."""
-    return tuple(start + (end - start) * (ranks.rank + k) // ranks.size for k in (0, 1))  # type: ignore[return-value]
+def _cuts(start: int, end: int, part: int, parts: int) -> tuple[int, int]:
+    """The bytes between ``start`` and ``end`` that belong to one of several parts."""
+    return start + (end - start) * part // parts, start + (end - start) * (part + 1) // parts
 
 
 def _lines(path: Path, start: int, end: int) -> Iterator[bytes]:
@@ -170,9 +237,12 @@ def _lines(path: Path, start: int, end: int) -> Iterator[bytes]:
             yield line
 
 
-def _item_starts(path: Path, start: int, end: int) -> list[int]:
-    """Bytes from ``start`` to ``end`` at which a line begins with ``ITEM:``."""
-    mark, found = b"ITEM:", []
+def _frame_marks(path: Path, reader: Reader, part: int, parts: int) -> list[int]:
+    """Bytes of one part of a dump at which a line begins with ``ITEM:``; none in files without frames."""
+    mark, found = b"ITEM:", list[int]()
+    if reader is not _dump_table:
+        return found
+    start, end = _cuts(0, path.stat().st_size, part, parts)
     with path.open("rb") as stream:
         for first in range(start, end, PIECE):
             stream.seek(max(first - 1, 0))

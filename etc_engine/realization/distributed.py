@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,16 +14,20 @@ import numpy as np
 from etc_engine.arrays import Floats
 from etc_engine.box import Box
 from etc_engine.engines.dtem.distributed.conductivity import Census, Scattered
-from etc_engine.errors import InputError
+from etc_engine.errors import ConvergenceError, EtcError, InputError
 from etc_engine.medium.conduction import Conduction
 from etc_engine.medium.conductivity import EffectiveConductivity
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import RULES, find_rule
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.collection import PackingSource
 from etc_engine.particle_files.parts import extremes, read_part
 from etc_engine.particle_files.sample import Sample, sample_box
 from etc_engine.ranks import Ranks, together
 from etc_engine.realization.engines import find_engine
+from etc_engine.realization.media import contact_network
+from etc_engine.realization.outcome import Outcome, Realization, Status
+from etc_engine.realization.specification import RealizationSpec
 from etc_engine.solvers.petsc import load_petsc
 
 Contacts = Callable[[ParticlePacking], ContactNetwork]
@@ -137,3 +143,79 @@ def solve_scattered(
         raise InputError("the particles have no column of conductivities: give them one")
     particles = Scattered(file.box, file.centers, file.radii, given)
     return engine.distribute(particles, contacts, conduction, ranks, gap=gap)
+
+
+def realize_together(spec: RealizationSpec, ranks: Ranks) -> Realization:
+    """One realization of packings in files, every medium solved by all ranks together.
+
+    Parameters
+    ----------
+    spec : RealizationSpec
+        Of method ``chord`` with the option ``distributed``, and a local contact rule.
+    ranks : Ranks
+        Every rank makes this call.
+
+    Returns
+    -------
+    Realization
+        The same on every rank. Its solid fraction is NaN, which takes the whole packing; so are the mean field and the
+        estimated error of its cells.
+
+    Raises
+    ------
+    InputError
+        On every rank, where PETSc is missing.
+    """
+    source, conduction = spec.packing, spec.conduction[0]
+    if not isinstance(source, PackingSource):
+        raise InputError("packings that ranks solve together are read from files")
+    check_distributed(conduction, spec.rule, ranks)
+    start, count = time.perf_counter(), math.prod(spec.shape)
+    try:
+        together(ranks, lambda: source.check() if ranks.rank == 0 else None)
+        chosen = together(ranks, lambda: source.chosen() if ranks.rank == 0 else source.sample)
+        file = read_scattered(source.path, ranks.share(chosen)[0], ranks)
+    except InputError as error:
+        failed = Outcome(Status.PACKING_FAILED, str(error))
+        return Realization(0, np.nan, np.nan, time.perf_counter() - start, (failed,) * count)
+    seconds = time.perf_counter() - start
+    solved = [_cell(file, spec, values, ranks) for values in spec.combinations()]
+    censuses = [census for _, census in solved if census is not None]
+    particles, density = (censuses[0].particles, censuses[0].density) if censuses else (0, np.nan)
+    return Realization(particles, density, np.nan, seconds, tuple(outcome for outcome, _ in solved))
+
+
+def _cell(
+    file: ScatteredFile, spec: RealizationSpec, values: dict[str, float], ranks: Ranks
+) -> tuple[Outcome, Census | None]:
+    """The outcome of one medium; an error is one that every rank has."""
+    start = time.perf_counter()
+    gap = values.get("bond_gap", 0.0) if "bond_gap" in find_rule(spec.rule).keys else 0.0
+    try:
+        result, census = solve_scattered(
+            file,
+            None if file.conductivity is not None else values["particle_conductivity"],
+            lambda packing: contact_network(packing, spec.rule, values),
+            spec.conduction[0],
+            ranks,
+            gap=gap,
+        )
+    except ConvergenceError as error:
+        return Outcome(Status.NOT_CONVERGED, str(error)), None
+    except EtcError as error:
+        return Outcome(Status.ERROR, str(error)), None
+    missing = result.missing_axes
+    outcome = Outcome(
+        status=Status.NOT_PERCOLATING if missing else Status.OK,
+        message=f"no path of contacts along {missing}" if missing else "",
+        conductivity=result.tensor,
+        contacts=census.contacts,
+        wall_contacts=int(census.wall_contacts.sum()),
+        coordination=2.0 * census.contacts / census.particles,
+        unknowns=result.unknowns,
+        iterations=result.iterations,
+        relative_energy_error=result.relative_energy_error,
+        solve_seconds=time.perf_counter() - start,
+        solved_by="full",
+    )
+    return outcome, census

@@ -47,8 +47,9 @@ def load_petsc(ranks: Ranks) -> ModuleType:
         try:
             from petsc4py import PETSc
         except Exception as error:  # a build for another NumPy raises ValueError, one without MPI RuntimeError
+            reason = " ".join(str(error).split())[:120]
             raise InputError(
-                f"--distributed needs petsc4py with hypre, which does not load ({' '.join(str(error).split())[:120]}): "
+                f"one packing on many ranks needs petsc4py with hypre, which does not load ({reason}): "
                 "install it (Debian: python3-petsc4py, with numpy<2; clusters: the site's module)"
             ) from None
         size = PETSc.COMM_WORLD.getSize()

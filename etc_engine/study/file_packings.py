@@ -10,14 +10,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from etc_engine.box import AXES
+from etc_engine.arrays import Floats
+from etc_engine.box import AXES, Box
 from etc_engine.errors import EtcError, InputError, StudyError
 from etc_engine.materials import find_solid
 from etc_engine.medium.rules import RULES
 from etc_engine.medium.sample_warnings import box_warnings, digit_warnings
 from etc_engine.particle_files.collection import PackingSource, find_sources
-from etc_engine.particle_files.sample import Range, Sample
+from etc_engine.particle_files.parts import read_extremes
+from etc_engine.particle_files.sample import Range, Sample, sample_box
 from etc_engine.realization import RealizationSpec
+from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.schema import Positive, StudyTable, Word
 from etc_engine.study.sweep import Study
 from etc_engine.study.tables import ParticlesTable
@@ -103,8 +106,11 @@ class FileStudy(Study):
             raise ValueError(
                 f"statistics.realizations: found {self.statistics.realizations}, the files hold {count} packings"
             )
+        if self.conduction.distributed:
+            self._check_distributed()
         if self.by_particle:
             given = self.particles.model_fields_set & {"conductivity", "material"}
+            given -= {"material"} if self.particles.material is None else set()  # so it stands in a resolved study
             if given or (self.particles.types and self.packing.column):
                 what = sorted(given)[0] if given else "types"
                 own = "their types" if self.particles.types and given else "a column 'conductivity'"
@@ -118,6 +124,27 @@ class FileStudy(Study):
                 if not self.values("temperature"):
                     raise ValueError(f"particles.types: {word!r} needs conduction.temperature: it depends on it")
         return self
+
+    def _check_distributed(self) -> None:
+        """Refuse what ranks that solve each packing together do not take."""
+        if set(self.methods) != {"chord"}:
+            other = next(method for method in self.methods if method != "chord")
+            raise ValueError(f"conduction.distributed: is for method 'chord', found {other!r}")
+        if not RULES[self.contacts.rule].local:
+            able = ", ".join(repr(name) for name, rule in RULES.items() if rule.local)
+            raise ValueError(
+                f"contacts.rule: found {self.contacts.rule!r}, allowed with conduction.distributed: {able}"
+            )
+        if self.packing.crop is not None:
+            raise ValueError("packing.crop: is not taken with conduction.distributed, write the part to a file")
+        if self.particles.types is not None:
+            raise ValueError("particles.types: is not taken with conduction.distributed, write a column 'conductivity'")
+        allowed = {"particle_conductivity", "contact_angle", "bond_gap", "contact_radius", "contact_resistance"}
+        for name, values in self.quantities.items():
+            if name not in allowed and any(values):
+                raise ValueError(f"{QUANTITIES[name].place}: is not taken with conduction.distributed")
+        if self.particles.material is not None:
+            raise ValueError("particles.material: is not taken with conduction.distributed, give the conductivity")
 
     @property
     def by_particle(self) -> bool:
@@ -160,6 +187,8 @@ class FileStudy(Study):
     def remarks(self) -> tuple[str, ...]:
         """Digits that do not decide on contacts, bare walls and cut particles of the first packing."""
         source = self.packing.source(0)
+        if self.conduction.distributed:  # no process reads a whole packing
+            return ()
         table = source.read()
         bonded = RULES[self.contacts.rule].takes_gap
         gap = min(self.values("bond_gap"), default=0.0) if bonded else 0.0
@@ -209,20 +238,34 @@ def find_packings(content: Mapping[str, Any], folder: Path, place: str) -> dict[
         sources = find_sources(
             folder, _text(packing["files"]), _frames(packing.get("frames", "last")), sample_of(packing)
         )
-        first = sources[0].read()
+        box, column = _first_packing(content, sources[0])
     except (EtcError, TypeError, ValueError) as error:
         raise StudyError(f"{place}: packing.files: {error}") from None
-    box = first.packing.box
     packing |= {
         "sources": [{"file": one.name, "frame": one.frame, "sha256": one.digest} for one in sources],
         "box": list(box.lengths),
         "periodic": box.periodic_axes,
-        "column": "" if first.conductivity is None else "conductivity",
+        "column": column,
         "folder": str(folder.resolve()),
     }
     statistics = dict(content.get("statistics", {}))
     statistics.setdefault("realizations", len(sources))
     return {**content, "packing": packing, "statistics": statistics}
+
+
+def _first_packing(content: Mapping[str, Any], source: PackingSource) -> tuple[Box, str]:
+    """The box of a packing, and the name of its column of conductivities; one for many ranks is not read whole."""
+    conduction = content.get("conduction", {})
+    if isinstance(conduction, Mapping) and conduction.get("distributed") is True:
+        ends = read_extremes(source.path, source.chosen())
+        bounds, periodic, _ = sample_box(ends, source.sample)
+        return Box(tuple((bounds[:, 1] - bounds[:, 0]).tolist()), periodic), _column(ends.conductivity)
+    table = source.read()
+    return table.packing.box, _column(table.conductivity)
+
+
+def _column(conductivity: Floats | None) -> str:
+    return "" if conductivity is None else "conductivity"
 
 
 def sample_of(packing: Mapping[str, Any]) -> Sample:

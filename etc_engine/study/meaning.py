@@ -13,7 +13,7 @@ from etc_engine.study.schema import StudyTable
 Needs = Mapping[str, tuple[str, ...]]
 """The place of a choice, and the words of it with which a key has a meaning."""
 
-NOT_SWEPT = ("dipoles", "threads", "distributed")
+NOT_SWEPT = ("dipoles", "threads")
 """Options of engines that a sweep has no use for: those of a transient, and of the machine."""
 
 NONE = ""

@@ -70,6 +70,10 @@ class Study(StudyFile):
         if dimension not in RULES[self.contacts.rule].dimensions:
             raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
         refuse_meaningless(self)
+        if self.conduction.distributed and not hasattr(self.packing, "sources"):
+            raise ValueError(
+                "conduction.distributed: is for packings in files ([packing] files), read in parts"
+            )
         check_conditions(self)
         check_models(self)
         if not engine.needs_contacts:
@@ -211,6 +215,8 @@ class Study(StudyFile):
         """
         values = super().resolved()
         values["conduction"]["method"] = self.conduction.method or self.methods[0]
+        if not self.conduction.distributed:  # studies from before this key stay the same ones
+            values["conduction"].pop("distributed", None)
         return drop_meaningless(self, values)
 
     def realization_spec(self, density: float | None) -> RealizationSpec:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from etc_engine.durable.lock import Holder, alive, read_holder
 from etc_engine.durable.provenance import peak_bytes
-from etc_engine.errors import EtcError, PackingError
+from etc_engine.errors import EtcError, PackingError, StudyError
 from etc_engine.realization import Status
 from etc_engine.study.sweep import Study, read_study
 from etc_engine.sweep.claim import difference
@@ -74,6 +74,8 @@ def forecast(study_path: Path, output: Path | None, ranks: int, realize: Realize
         If the packing of a probe does not reach its density.
     """
     study, _ = read_study(study_path)
+    if study.conduction.distributed:
+        raise StudyError(f"{study_path}: conduction.distributed: --dry-run probes on one rank, which is not to hold it")
     state, done = ("no output is named", set()) if output is None else what_is_there(study, output)
     targets = (study.statistics.realizations,) * len(study.densities)
     units = units_to_run(study.densities, targets, np.empty((0, 2), np.int64))

@@ -62,6 +62,8 @@ def rerun(
         If the file has no such cell, or has never run it.
     """
     study = study_of(json.loads(dataset.attrs["study_resolved"]))
+    if study.conduction.distributed:
+        raise InputError("a packing that many ranks solved together is not run again on one: use the command sweep")
     row = _density_index(dataset["density"].values, density)
     if not 0 <= realization < dataset.sizes["realization"]:
         last = dataset.sizes["realization"] - 1

@@ -224,6 +224,8 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
 
     Every rank takes one number beyond the last unit: the next round's base allows for it.
     """
+    if round_.claim.study.conduction.distributed:
+        return _compute_together(round_, communicator, stop)
     claim, units = round_.claim, round_.plan.units
     densities = claim.study.densities
     specs = [claim.study.realization_spec(density) for density in densities]
@@ -244,6 +246,39 @@ def _compute(round_: _Round, communicator: Communicator, realize: Realize, stop:
         communicator.add(NEXT, STOP)
         return str(error)
     return stop.reason
+
+
+def _compute_together(round_: _Round, communicator: Communicator, stop: StopRequest) -> str:
+    """Units one after the other, each by all ranks, of which rank 0 keeps the records; returns as `_compute`.
+
+    A signal is heeded between units: within one, ranks wait for each other.
+    """
+    from etc_engine.realization.distributed import realize_together
+
+    study, folder = round_.claim.study, round_.claim.folder
+    with ExitStack() as held:
+        shard = held.enter_context(ShardWriter(folder, round_.shard, 0)) if communicator.rank == 0 else None
+        for i, realization in round_.plan.units.tolist():
+            reason = next(filter(None, communicator.share(stop.reason)), "")
+            if reason:
+                return reason
+            unit, started = Unit(study.densities[i], realization), time.time()
+            spec = study.for_realization(study.realization_spec(unit.density), realization)
+            result = realize_together(spec, communicator)
+            trouble = None
+            if shard is not None:
+                record = Record(unit, result, 0, socket.gethostname(), started, time.time())
+                try:
+                    shard.append(record)
+                except OutputError as error:
+                    trouble = str(error)
+                communicator.add(DONE, 1)
+                communicator.add(FAILED, record.failed)
+            trouble = communicator.broadcast(trouble)
+            if trouble:
+                return str(trouble)
+            round_.tell(communicator)
+    return ""
 
 
 def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize: Realize) -> Record:

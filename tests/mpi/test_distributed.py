@@ -20,6 +20,7 @@ from etc_engine.box import Box
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.formats import write_particles
 from etc_engine.particle_files.table import ParticleTable
+from etc_engine.sweep.result_file import open_dataset
 
 ROOT = Path(__file__).parents[2]
 PYTHON = Path(os.environ.get("ETC_ENGINE_PETSC_PYTHON", ROOT / ".venv-petsc/bin/python"))
@@ -114,21 +115,25 @@ def disks(tmp_path):
     table = ParticleTable(packing, conductivity=rng.uniform(1.0, 2.0, 225), ids=rng.permutation(225) + 1)
     for name in ("disks.dump", "disks.csv", "disks.nc"):
         write_particles(tmp_path / name, table)
-    frame = (tmp_path / "disks.dump").read_text()
-    (tmp_path / "disks.dump").write_text(frame.replace("0.5", "0.45") + frame.replace("TIMESTEP\n0", "TIMESTEP\n5"))
+    kept = np.arange(225) % 7 > 0
+    other = ParticleTable(packing.select(kept), table.conductivity[kept], table.ids[kept])
+    write_particles(tmp_path / "other.dump", other)
+    last = (tmp_path / "disks.dump").read_text().replace("TIMESTEP\n0", "TIMESTEP\n5")
+    (tmp_path / "disks.dump").write_text((tmp_path / "other.dump").read_text() + last)
+    (tmp_path / "other.dump").unlink()
     return tmp_path
 
 
 @pytest.mark.petsc
 def test_each_rank_reads_its_part_of_a_file(disks, etc_engine):
-    """Three ranks, so that a cut falls inside lines; the records are those of one rank."""
+    """Cuts between ranks fall inside lines; the records are those of one rank."""
     whole = json.loads(etc_engine("solve", disks / "disks.dump", "--axis", "y", "--json").stdout)
     box = ("--box", "1,1")
-    for name, options in (("disks.dump", ()), ("disks.csv", box), ("disks.nc", ())):
-        done = solve(3, disks / name, "--axis", "y", "--json", *options)
+    for count, name, options in ((3, "disks.dump", ()), (2, "disks.csv", box), (2, "disks.nc", ())):
+        done = solve(count, disks / name, "--axis", "y", "--json", *options)
         assert done.returncode == 0, done.stderr
         record = json.loads(done.stdout)
-        assert record.pop("ranks") == 3
+        assert record.pop("ranks") == count
         assert set(whole) - set(record) <= {"model_error_estimate"}
         for key in ("particles", "contacts", "links", "wall_contacts", "unknowns", "percolates", "contact_rule"):
             assert record[key] == whole[key], key
@@ -156,6 +161,80 @@ def test_an_error_on_one_rank_ends_all(disks):
     done = ranks(2, "-c", code, timeout=60.0)
     assert done.returncode == 1
     assert "unexpected MemoryError on rank 1: no room" in done.stderr
+
+
+STUDY = """
+schema = 2
+name = "together"
+seed = 5
+[packing]
+files = "*.dump"
+{packing}
+[contacts]
+rule = "bonded"
+contact_angle = [2.0, 3.0]
+bond_gap = 0.02
+{contacts}
+[conduction]
+{conduction}
+[statistics]
+"""
+
+
+@pytest.fixture
+def study(disks):
+    """Writer of a study over the two frames of the dump."""
+
+    def write(conduction: str, packing: str = 'frames = "all"', contacts: str = "") -> Path:
+        path = disks / "study.toml"
+        path.write_text(STUDY.format(conduction=conduction, packing=packing, contacts=contacts))
+        return path
+
+    return write
+
+
+@pytest.mark.petsc
+def test_a_sweep_solves_each_packing_by_all_ranks(disks, study, etc_engine):
+    """Two frames, two angles; the cells are those of a sweep on one rank, and --resume finds them."""
+    assert etc_engine("sweep", study('method = "chord"'), "-o", disks / "one.nc").returncode == 0
+    command = ("-m", "etc_engine", "sweep", study('method = "chord"\ndistributed = true'), "-o", disks / "two.nc")
+    done = ranks(2, *command)
+    assert done.returncode == 0, done.stderr
+    assert "2 units (2 computed now on 2 ranks" in done.stdout
+    again = ranks(2, *command, "--resume")
+    assert "2 units (0 computed now" in again.stdout, again.stderr
+    with open_dataset(disks / "one.nc") as one, open_dataset(disks / "two.nc") as two:
+        assert two.sizes == one.sizes
+        np.testing.assert_allclose(two["conductivity"], one["conductivity"], rtol=1e-8)
+        for name in ("contacts", "wall_contacts", "particles", "unknowns", "status", "coordination"):
+            np.testing.assert_array_equal(two[name], one[name])
+        assert np.isnan(two["solid_fraction"]).all()  # it takes the whole packing
+    done = etc_engine("rerun", disks / "two.nc", "--realization", 0)
+    assert done.returncode == 2 and "not run again on one" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"conduction": 'method = ["chord", "arc"]'}, "is for method 'chord', found 'arc'"),
+        ({"packing": 'crop = ["0:0.5", ""]'}, "packing.crop: is not taken"),
+        ({"contacts": 'rule = "coordination"\ncoordination = 3.0'}, "allowed with conduction.distributed"),
+        ({"packing": 'method = "random-sequential"'}, "is for packings in files"),
+    ],
+)
+def test_a_study_for_many_ranks_is_refused_by_key(study, etc_engine, changes, words):
+    path = study(changes.pop("conduction", 'method = "chord"') + "\ndistributed = true", **changes)
+    text = path.read_text()
+    if "coordination" in text:
+        path.write_text(text.replace('rule = "bonded"\n', "").replace("bond_gap = 0.02\n", ""))
+    if "sequential" in text:
+        made = 'radii = "equal:0.05"\nbox = [1.0, 1.0]\ndensity = 0.4'
+        path.write_text(
+            text.replace('files = "*.dump"', made).replace("[statistics]", "[statistics]\nrealizations = 2")
+        )
+    done = etc_engine("sweep", path, "-o", path.with_name("out.nc"))
+    assert done.returncode == 2
+    assert words in done.stderr
 
 
 CORE = ("test_dtem", "test_amg_cg", "test_readers", "test_packing_neighbors", "test_resistance")
@@ -188,9 +267,9 @@ def test_without_petsc_it_is_one_line(disks, etc_engine, monkeypatch):
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        ("--method=arc", "option distributed means nothing to method arc"),
-        ("--method=cell", "option distributed means nothing to method cell"),
-        ("--engine=pipe", "option distributed means nothing to method chord of engine pipe"),
+        ("--method=arc", "method arc of engine dtem: it heeds angle_curve"),
+        ("--method=cell", "method cell of engine dtem: it heeds degree"),
+        ("--engine=pipe", "method chord of engine pipe: it heeds none"),
         ("--pore-conductivity=0.1", "--pore-conductivity is not taken with --distributed"),
         ("--crop=0:1,0:0.5", "--crop is not taken with --distributed"),
         ("-o=field.nc", "-o is not taken with --distributed"),
