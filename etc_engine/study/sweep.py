@@ -71,9 +71,7 @@ class Study(StudyFile):
             raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
         refuse_meaningless(self)
         if self.conduction.distributed and not hasattr(self.packing, "sources"):
-            raise ValueError(
-                "conduction.distributed: is for packings in files ([packing] files), read in parts"
-            )
+            raise ValueError("conduction.distributed: is for packings in files ([packing] files), read in parts")
         check_conditions(self)
         check_models(self)
         if not engine.needs_contacts:
