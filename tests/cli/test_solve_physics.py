@@ -127,7 +127,7 @@ def test_the_help_names_every_method(capfd):
         (["--roughness", "1e-6"], "takes height, slope and hardness"),
         (["--gas", "helium", "--pressure", "1e5"], "needs a temperature"),
         (["--gas", "helium", "--pressure", "1e5", "--temperature", "300", "--pore-conductivity", "1"], "leave one"),
-        (["--pressure", "1e5"], "give the gas by name"),
+        (["--pressure", "1e5"], "a pressure needs a gas"),
         (["--emissivity", "0.8"], "needs a temperature"),
         (["--material", "copper"], "needs --temperature"),
         (["--material", "copper", "--temperature", "300", "--conductivity", "5"], "leave one of them out"),

@@ -76,7 +76,8 @@ const first = form.studyOf(schema, tables, values);
 Object.assign(values, {{"packing.method": "lubachevsky-stillinger", "packing.count": "12", "packing.periodic": "xy",
   "packing.radii": "equal", "packing.density": "0.2",
   "conduction.engine": "voxel", "conduction.method": "laminate, binary",
-  "particles.conductivity": "2, 10", "pores.conductivity": "1", "conduction.resolution": "40"}});
+  "particles.conductivity": "2, 10", "pores.conductivity": "1", "conduction.resolution": "40",
+  "models.names": "maxwell"}});
 const second = form.studyOf(schema, tables, values);
 console.log(JSON.stringify([first, second, form.tomlOf(second)]));
 """
