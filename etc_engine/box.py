@@ -5,11 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 
 AXES = "xyz"
+
+
+def ball_measure(radii: ArrayLike, dimension: int) -> Floats:
+    """Length, area or volume of balls in 1, 2 or 3 dimensions: 2 R, pi R^2, 4/3 pi R^3.
+
+    Examples
+    --------
+    >>> ball_measure([1.0, 2.0], 1), round(float(ball_measure(1.0, 3)), 6)
+    (array([2., 4.]), 4.18879)
+    """
+    return np.asarray((2.0, np.pi, 4.0 / 3.0 * np.pi)[dimension - 1] * np.asarray(radii) ** dimension)
+
+
+def ball_radius(measure: ArrayLike, dimension: int) -> Floats:
+    """Radius of balls of a length, area or volume, the inverse of `ball_measure`.
+
+    Examples
+    --------
+    >>> round(float(ball_radius(ball_measure(0.3, 3), 3)), 12)
+    0.3
+    """
+    return np.asarray((np.asarray(measure) / ball_measure(1.0, dimension)) ** (1.0 / dimension))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from etc_engine.box import ball_measure
 from etc_engine.comparison.simulation import current_study
 from etc_engine.materials import accommodation_from_masses, find_solid, gas_state, jump_length
 from etc_engine.realization import Status
@@ -39,7 +40,7 @@ def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     volumes = dataset["packing_density"] * float(np.prod(study["packing"]["box"])) / particles
     files = "sources" in study["packing"]  # of these the box of the first is known
     volume = volumes.isel(realization=0, drop=True) if files else volumes.mean("realization")
-    found["diameter"] = 2.0 * (volume / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension)
+    found["diameter"] = 2.0 * (volume / float(ball_measure(1.0, dimension))) ** (1.0 / dimension)
     valid = dataset["status"] <= int(Status.NOT_PERCOLATING)
     found["coordination"] = dataset["coordination"].where(valid).mean("realization")
     for name in ("temperature", "emissivity"):

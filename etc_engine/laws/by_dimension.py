@@ -120,17 +120,6 @@ def length_scales(radii: Floats, dimension: int) -> Floats:
     return np.asarray(radii ** (dimension - 2))
 
 
-def ball_measure(radii: Floats, dimension: int) -> Floats:
-    """Length, area or volume of balls in 1, 2 or 3 dimensions: 2 c, pi c^2, 4/3 pi c^3.
-
-    Examples
-    --------
-    >>> ball_measure(np.array([1.0, 2.0]), 1)
-    array([2., 4.])
-    """
-    return np.asarray((2.0, np.pi, 4.0 / 3.0 * np.pi)[dimension - 1] * radii**dimension)
-
-
 def self_resistance(alpha: Floats, radii: Floats, dimension: int, method: str) -> Floats:
     """Resistance kappa h_ii between a contact and the mean of its particle, dimensionless or, of spheres, [1/m].
 

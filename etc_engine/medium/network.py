@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from etc_engine.arrays import Flags, Floats, Ints
+from etc_engine.box import ball_measure
 from etc_engine.errors import InputError
-from etc_engine.laws.by_dimension import ball_measure, law_of
+from etc_engine.laws.by_dimension import law_of
 from etc_engine.packing.particles import ParticlePacking
 
 LARGEST = 1e100

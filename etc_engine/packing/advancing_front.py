@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from etc_engine.arrays import Floats
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.cell_grids import cell_grids, cell_of, cell_range
 from etc_engine.packing.particles import ParticlePacking
@@ -126,7 +126,7 @@ def pack_given_disks(sizes: Floats, spare: RadiusDistribution, box: Box, rng: np
         if given.sum() == sizes.size:
             return ParticlePacking(centers[given[: len(centers)]], stream[given], box)
         slots = int(0.99 * min(slots, len(centers)))
-    wanted = float(np.pi * np.sum(sizes**2) / box.volume)
+    wanted = float(np.sum(ball_measure(sizes, 2)) / box.volume)
     raise PackingError(
         f"{sizes.size} disks of total density {wanted:.6g} do not fit: the advancing front fills this box to "
         f"about {own:.4g}; ask for less, let the radii grow, or use lubachevsky-stillinger",
@@ -140,7 +140,7 @@ def enough_radii(radii: RadiusDistribution, box: Box, rng: np.random.Generator) 
     block = int(1.1 * box.volume / radii.mean_measure(d)) + 10
     sizes = radii.sample(block, rng)
     while True:
-        filled = np.cumsum(np.pi * sizes**2 if d == 2 else 4.0 / 3.0 * np.pi * sizes**3)
+        filled = np.cumsum(ball_measure(sizes, d))
         if filled[-1] > box.volume:
             return sizes[: int(np.searchsorted(filled, box.volume)) + 1]
         sizes = np.concatenate((sizes, radii.sample(block, rng)))

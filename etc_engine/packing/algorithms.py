@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from etc_engine.arrays import Floats
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.advancing_front import enough_radii, pack_advancing_front, pack_given_disks
 from etc_engine.packing.density import set_density
@@ -135,7 +135,7 @@ def _scaled_sizes(spec: PackingSpec, rng: np.random.Generator) -> Floats:
         refuse_wide_particles(sizes, spec.box)  # lengths are meant: one disk wider than the box is no packing
     if spec.density is None:
         return sizes
-    measures = np.pi * sizes**2 if d == 2 else 4.0 / 3.0 * np.pi * sizes**3
+    measures = ball_measure(sizes, d)
     scale = (spec.density * spec.box.volume / float(measures.sum())) ** (1.0 / d)
     return np.asarray(sizes * scale)
 

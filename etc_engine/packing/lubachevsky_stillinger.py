@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from etc_engine.arrays import Floats, Ints
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.hard_spheres import DONE, EXCURSION, FULL, Gas, make_gas, run, start_lists
 from etc_engine.packing.overlap import check_no_overlap
@@ -208,8 +208,7 @@ def _grow(
 
 def _unit_scale(radii: Floats, box: Box) -> float:
     """Factor on the radii that makes the density 1."""
-    measures = np.pi * radii**2 if box.dimension == 2 else 4.0 / 3.0 * np.pi * radii**3
-    return float((box.volume / measures.sum()) ** (1.0 / box.dimension))
+    return float((box.volume / ball_measure(radii, box.dimension).sum()) ** (1.0 / box.dimension))
 
 
 def _refuse_the_impossible(radii: Floats, box: Box, density: float | None) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from etc_engine.arrays import Flags, Floats, Ints
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.errors import GeometryError, InputError
 
 
@@ -87,7 +87,7 @@ class ParticlePacking:
     @property
     def measures(self) -> Floats:
         """Full area [m2] of each disk or volume [m3] of each sphere, shape (n,)."""
-        return np.pi * self.radii**2 if self.dimension == 2 else 4.0 / 3.0 * np.pi * self.radii**3
+        return ball_measure(self.radii, self.dimension)
 
     @property
     def density(self) -> float:

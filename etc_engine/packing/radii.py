@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from etc_engine.arrays import Floats
+from etc_engine.box import ball_measure
 from etc_engine.errors import InputError
 
 GAUSSIAN_CUT = 3.0
@@ -99,7 +100,7 @@ class RadiusDistribution:
 
     def mean_measure(self, dimension: int) -> float:
         """Mean area of a disk (dimension 2) [m2] or mean volume of a sphere (dimension 3) [m3]."""
-        return float(np.pi * self.moment(2) if dimension == 2 else 4.0 / 3.0 * np.pi * self.moment(3))
+        return float(ball_measure(1.0, dimension) * self.moment(dimension))
 
 
 def parse_radii(text: str) -> RadiusDistribution:

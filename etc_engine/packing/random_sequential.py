@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from etc_engine.arrays import Floats
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.errors import InputError, PackingError
 from etc_engine.packing.cell_grids import CellGrids, cell_grids, cell_of, cell_range
 from etc_engine.packing.particles import ParticlePacking
@@ -191,9 +191,7 @@ def _try_what_is_left(
         if len(corners) * len(halves) > MOST_VOXELS:
             raise PackingError(
                 f"saturation could not be decided within {MOST_VOXELS} voxels: use fewer particles at a time",
-                reached=float(
-                    state.placed * (np.pi * radius**2 if d == 2 else 4.0 / 3.0 * np.pi * radius**3) / box.volume
-                ),
+                reached=float(state.placed * ball_measure(radius, d) / box.volume),
             )
         picked = rng.integers(0, len(corners), 4 * len(corners))
         points = corners[picked] + rng.random((len(picked), 3)) * width

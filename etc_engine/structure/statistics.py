@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from etc_engine.arrays import Flags, Floats, Ints
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.errors import InputError
 from etc_engine.packing.neighbors import NeighborPairs, neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
@@ -175,7 +175,7 @@ def pair_correlation(packing: ParticlePacking, farthest: float, bins: int = 100)
     edges = np.linspace(0.0, farthest, bins + 1)
     counts, _ = np.histogram(distances, edges)
     # the volume of a shell is a difference of powers; the window varies slowly across it
-    shells = (np.pi if d == 2 else 4.0 / 3.0 * np.pi) * np.diff(edges**d)
+    shells = ball_measure(1.0, d) * np.diff(edges**d)
     middles = 0.5 * (edges[1:] + edges[:-1])
     expected = 0.5 * packing.count * (packing.count - 1) * shells * _window(box, middles) / box.volume
     return RadialFunction(middles, np.asarray(counts / expected, dtype=np.float64))

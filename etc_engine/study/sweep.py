@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from etc_engine.box import Box, parse_periodic
+from etc_engine.box import Box, ball_radius, parse_periodic
 from etc_engine.engines.voxel.voxelization import check_memory, coarsest_resolution
 from etc_engine.errors import InputError, StudyError
 from etc_engine.medium.rules import RULES
@@ -142,7 +142,7 @@ class Study(StudyFile):
             return None
         dimension = len(packing.box)
         measure = min(d for d in self.densities if d is not None) * float(np.prod(packing.box)) / packing.count
-        return float((measure / (np.pi if dimension == 2 else 4.0 / 3.0 * np.pi)) ** (1.0 / dimension))
+        return float(ball_radius(measure, dimension))
 
     @property
     def methods(self) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from etc_engine.arrays import Floats
-from etc_engine.laws.by_dimension import ball_measure
+from etc_engine.box import ball_measure
 from etc_engine.laws.film import edge_factor, film_excess
 from etc_engine.medium.sides import ContactSides
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from etc_engine.arrays import Flags
-from etc_engine.box import Box
+from etc_engine.box import Box, ball_measure
 from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.engines.lattice.fitted import fitted_seeds
 from etc_engine.engines.lattice.network import TRANSMISSIONS, Lattice, contact_lattice, laguerre_lattice
@@ -95,7 +95,7 @@ def ball_lattice(
     Examples
     --------
     >>> ball = ball_lattice(0.05, 200, np.random.default_rng(9))
-    >>> round(float(ball.volumes.sum()) / (4 / 3 * np.pi * 0.05**3), 5)
+    >>> round(float(ball.volumes.sum() / ball_measure(0.05, 3)), 5)
     1.0
     """
     if not (np.isfinite(radius) and radius > 0.0):
@@ -105,7 +105,7 @@ def ball_lattice(
     edge = 2.0 * ROOM * radius
     box = Box((edge, edge, edge), (True, True, True))
     ball = ParticlePacking([[0.5 * edge] * 3], [radius], box)  # type: ignore[arg-type]
-    filled = 4.0 / 3.0 * np.pi * radius**3 / box.volume
+    filled = float(ball_measure(radius, 3)) / box.volume
     if transmission == "laguerre":
         seeds = fitted_seeds(ball, round(count / filled), rng, offset=MIDDLE)
         return carve(laguerre_lattice(seeds.packing), seeds.owner == 0)
@@ -127,7 +127,7 @@ def _ball_of_contacts(lattice: Lattice, radius: float) -> Lattice:
     lengths = np.maximum(lengths, 0.01 * packing.radii[inside][body.wall_particles])
     return replace(
         body,
-        volumes=body.volumes * (4.0 / 3.0 * np.pi * radius**3 / body.volumes.sum()),
+        volumes=body.volumes * (ball_measure(radius, 3) / body.volumes.sum()),
         wall_segments=lengths,
         wall_crossings=lengths[:, None] * along,
     )

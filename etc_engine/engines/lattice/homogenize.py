@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from etc_engine.arrays import Floats, Ints
-from etc_engine.box import AXES, Box
+from etc_engine.box import AXES, Box, ball_measure
 from etc_engine.engines.lattice.calibration import pack_lattice
 from etc_engine.engines.lattice.fitted import NARROW, fitted_seeds
 from etc_engine.engines.lattice.network import (
@@ -214,7 +214,7 @@ def medium_lattice(
 
 def dense_packing(count: int, box: Box, rng: np.random.Generator) -> ParticlePacking:
     """A packing for a contact lattice, as dense as it soon gets: 0.635, and less between walls."""
-    radius = (DENSE * box.volume / (4.0 / 3.0 * np.pi * count)) ** (1.0 / 3.0)
+    radius = (DENSE * box.volume / (float(ball_measure(1.0, 3)) * count)) ** (1.0 / 3.0)
     layers = sum(2.0 * radius / length for length, flag in zip(box.lengths, box.periodic, strict=True) if not flag)
     density = DENSE * max(1.0 - LOOSER * layers, 0.5)
     try:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
-from etc_engine.box import AXES, Box
+from etc_engine.box import AXES, Box, ball_radius
 from etc_engine.output.figures.canvas import COLOURS, GREY, INK, new_figure, save, style
 from etc_engine.output.figures.packing import draw_particles
 from etc_engine.packing.neighbors import NeighborPairs, neighbor_pairs
@@ -187,8 +187,7 @@ def _write_numbers(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs
 def _farthest_pairs(packing: ParticlePacking) -> float:
     """Distance up to which the pair correlation is drawn [m]."""
     d, box = packing.dimension, packing.box
-    ball = np.pi if d == 2 else 4.0 / 3.0 * np.pi
-    within_reach = (2.0 * MOST_PAIRS * box.volume / (ball * packing.count**2)) ** (1.0 / d)
+    within_reach = float(ball_radius(2.0 * MOST_PAIRS * box.volume / packing.count**2, d))
     return float(min(FARTHEST * 2.0 * packing.radii.mean(), within_reach, 0.5 * min(box.lengths)))
 
 
