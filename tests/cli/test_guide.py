@@ -113,18 +113,6 @@ def test_a_notebook_runs_and_ends_with_its_picture(path, tmp_path):
         assert (folder / f"{path.stem}.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize("page", PAGES, ids=named)
-def test_marked_commands_run(page, tmp_path, monkeypatch, etc_engine):
-    monkeypatch.chdir(tmp_path)
-    for mark, text in blocks(page, "sh"):
-        if mark == "run":
-            for line in text.splitlines():
-                program, *words = shlex.split(line)
-                assert program == "etc-engine"
-                done = etc_engine(*words)
-                assert done.returncode == 0, done.stderr
-
-
 def test_the_study_of_the_guide_is_valid():
     (_, text), *_ = blocks(SITE / "sweeps.md", "toml")
     assert parse_study(text).densities == (0.6, 0.7)
