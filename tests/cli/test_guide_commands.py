@@ -39,7 +39,7 @@ def grid(lengths: tuple[float, ...], radius: float) -> ParticlePacking:
 
 
 def contact_dump(packing: ParticlePacking) -> str:
-    """Contacts of the grid with a force each, in the columns of ``pair/gran/local pos id force contactArea heatFlux``."""
+    """Contacts of the grid with a force, in the columns of ``pair/gran/local pos id force contactArea heatFlux``."""
     rows = []
     for i, j in overlap_contacts(packing).pairs:
         places = [*(packing.centers[i] + ORIGIN), 0.0, *(packing.centers[j] + ORIGIN), 0.0]
