@@ -59,3 +59,36 @@ def test_without_hardware_the_others_wait_for_rank_0(scaling, free):
     times = np.array([10.0, 1.0, 1.0, 1.0])
     assert scaling.simulate(2, times, free).last == pytest.approx(10.0)
     assert scaling.simulate(2, times, soft).last > 11.0 - 1e-9
+
+
+@pytest.fixture(scope="module")
+def packing():
+    spec = importlib.util.spec_from_file_location("scaling_packing", SCRIPT.with_name("packing.py"))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["scaling_packing"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("dimension", "own", "ranks", "expected"),
+    [
+        (2, 100.0, 4, 0.21),  # 10 x 10 in a corner: a layer on two sides, (11^2 - 10^2)/100
+        (3, 1000.0, 8, 0.331),  # 10 x 10 x 10 in a corner
+        (3, 1000.0, 1, 0.0),
+        (3, 1000.0, 10**12, 0.728),  # inside: a layer on all sides, 12^3/10^3 - 1
+    ],
+)
+def test_a_block_has_a_layer_of_copies_on_each_side_that_is_cut(packing, dimension, own, ranks, expected):
+    assert packing.copied(own, ranks, dimension) == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_memory_of_a_rank_is_that_which_was_measured(packing):
+    """MB above the libraries on 1, 2 and 4 ranks, as `tests/benchmarks/bench_distributed.py` has found them."""
+    for costs, count, measured in (
+        (packing.DISKS, 440_997, (672, 344, 172)),
+        (packing.SPHERES, 194_540, (570, 291, 164)),
+    ):
+        for ranks, found in zip((1, 2, 4), measured, strict=True):
+            memory = packing.forecast(count, ranks, costs).memory - costs.libraries
+            assert memory / 1e6 == pytest.approx(found, rel=0.1)
