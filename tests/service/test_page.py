@@ -127,11 +127,48 @@ def test_the_form_follows_the_engine(slow, browser):
     browser.write(written("packing.periodic"), "xy")
     browser.write(written("packing.radii"), "equal:0.05")
     browser.write(written("packing.density"), "0.2, 0.3")
+    browser.write(written("models.names"), "maxwell")
     browser.write(written("conduction.resolution"), "2")
     assert "at least" in problem_beside(browser, "conduction.resolution")
     browser.write(written("conduction.resolution"), "40")
-    browser.write(written("models.names"), "maxwell")
     browser.until("return document.getElementById('size').innerText.startsWith('40 packings, 40 results')")
+
+
+def test_the_form_takes_a_bed_between_walls_of_two_temperatures(slow, browser):
+    """The difference of the walls is asked for with nonlinear = true only, and that with the method that takes it."""
+    pytest.importorskip("CoolProp")
+    shown = "return [...document.querySelectorAll('.field')].filter(f => f.offsetParent).map(f => f.dataset.field)"
+    choose = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input', {bubbles: true}))"
+    browser.open("about:blank")
+    browser.open(slow.url)
+    browser.until(shown)
+    chosen = {"packing.method": "lubachevsky-stillinger", "contacts.rule": "overlap"}
+    for field, word in chosen.items():
+        browser.run(choose, {ELEMENT: browser.find(written(field))}, word)
+    assert "conduction.nonlinear" not in browser.run(shown)
+    browser.write(written("conduction.method"), "facets")
+    assert "conduction.temperature_difference" not in browser.run(shown)
+    browser.run(choose, {ELEMENT: browser.find(written("conduction.nonlinear"))}, "true")
+    assert "conduction.temperature_difference" in browser.run(shown)
+    values = {
+        "packing.radii": "equal",
+        "packing.count": "8",
+        "packing.box": "2e-3, 2e-3, 4e-3",
+        "packing.periodic": "xy",
+        "packing.density": "0.4",
+        "particles.material": "alumina",
+        "pores.gas": "helium",
+        "pores.pressure": "1e5",
+        "radiation.emissivity": "0.8",
+        "models.names": "maxwell",
+        "statistics.realizations": "2",
+        "conduction.temperature": "600",
+    }
+    for field, word in values.items():
+        browser.write(written(field), word)
+    assert "missing" in problem_beside(browser, "conduction.temperature_difference")
+    browser.write(written("conduction.temperature_difference"), "100, 300")
+    browser.until("return document.getElementById('size').innerText.startsWith('2 packings, 4 results')")
 
 
 def test_a_pasted_study_is_refused_then_taken_and_cancelled(slow, browser):
