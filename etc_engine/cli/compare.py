@@ -224,8 +224,7 @@ def _print_fits(fits: tuple[Fit, ...]) -> None:
         if not fit.parameters:
             reasons.setdefault(f"no fit of {fit.model}: {fit.note}", where)
             continue
-        constants = ", ".join(map(str, fit.parameters))
-        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {constants}")
+        click.echo(f"fit of {fit.model}{f' ({where})' if where else ''}, {fit.points} densities: {fit.constants}")
     for reason in reasons:
         click.echo(reason)
 

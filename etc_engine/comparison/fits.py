@@ -31,8 +31,8 @@ class Parameter:
 
     Examples
     --------
-    >>> str(Parameter("threshold", 0.3653, -0.81, 1.54)), str(Parameter("exponent", 1.303, 1.251, 1.356))
-    ('threshold not determined by these densities', 'exponent 1.303 [1.251, 1.356]')
+    >>> Parameter("threshold", 0.3653, -0.81, 1.54).determined, Parameter("exponent", 1.303, 1.251, 1.356).determined
+    (False, True)
     """
 
     name: str
@@ -44,11 +44,6 @@ class Parameter:
     def determined(self) -> bool:
         """Whether the data determine the constant: its interval is finite and narrower than `OPEN` times its value."""
         return bool(self.high - self.low <= OPEN * abs(self.value))
-
-    def __str__(self) -> str:
-        if not self.determined:
-            return f"{self.name} {UNDETERMINED}"
-        return f"{self.name} {self.value:.4g} [{self.low:.4g}, {self.high:.4g}]"
 
 
 @dataclass(frozen=True)
@@ -75,6 +70,13 @@ class Fit:
     parameters: tuple[Parameter, ...] = ()
     rms_relative_residual: float = np.nan
     note: str = ""
+
+    @property
+    def constants(self) -> str:
+        """The constants with their intervals, in words; without numbers where the data do not determine them."""
+        found = [f"{p.name} {p.value:.4g} [{p.low:.4g}, {p.high:.4g}]" for p in self.parameters if p.determined]
+        open_ones = " and ".join(p.name for p in self.parameters if not p.determined)
+        return ", ".join([*found, *([f"{open_ones} {UNDETERMINED}"] if open_ones else [])])
 
 
 @dataclass(frozen=True)

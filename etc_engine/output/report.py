@@ -269,7 +269,7 @@ def _fits(fits: Sequence[Fit]) -> str:
             fit.model,
             ", ".join(word_of(key, value) for key, value in fit.selection.items()) or "all",
             str(fit.points),
-            "; ".join(map(str, fit.parameters)),
+            fit.constants,
             _number(100.0 * fit.rms_relative_residual, ".2f"),
         ]
         for fit in fits
