@@ -78,7 +78,8 @@ def add_closest(result: xarray.Dataset) -> None:
 def closest_words(comparison: xarray.Dataset) -> list[str]:
     """The closest models of a whole sweep in words for readers, or why none is named; empty where there is none."""
     attrs = comparison.attrs
-    error = f"{100 * attrs['rms_error']:.2g} %" if np.isfinite(attrs["rms_error"]) else "unknown"
+    percent = 100.0 * attrs["rms_error"]
+    error = "unknown" if np.isnan(percent) else f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
 
     def described(name: str) -> str:
         rms = comparison["rms_relative_difference"].sel({"model": name})

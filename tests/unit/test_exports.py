@@ -117,6 +117,14 @@ def test_csv_holds_every_cell_with_its_interval():
     assert "intervals of 95 %" in text and "commit: abc" in text
 
 
+def test_the_error_of_the_method_is_named_beside_the_intervals():
+    data = sweep()
+    assert "Estimated error" not in EXPORTS["csv"](*curves_of(data, {}))
+    data["model_error_estimate"] = data["status"] * 0.0 + 0.043
+    text = EXPORTS["csv"](*curves_of(data, {}))
+    assert "# Estimated error of the method, not in the intervals: up to 4.3 %.\n" in text
+
+
 def test_csv_takes_units_from_the_result():
     """Every dimension with a unit has it in the header, whether it is varied or fixed."""
     resistance = QUANTITIES["contact_resistance"].attributes(2)

@@ -61,12 +61,15 @@ class Source:
         Global attributes of the result: commit, command, versions.
     units : mapping
         Of the coordinates that have a dimension, in the spelling of CF.
+    method_error : float
+        Largest estimated relative error of the method, which the intervals do not hold; NaN if there is none.
     """
 
     study: str
     confidence: float
     attributes: Mapping[str, Any]
     units: Mapping[str, str]
+    method_error: float = np.nan
 
     @property
     def lines(self) -> list[str]:
@@ -75,6 +78,10 @@ class Source:
             f"Effective thermal conductivity [W/(m K)] of the bed of study {self.study!r}.",
             f"Mean over realizations; intervals of {100.0 * self.confidence:g} % (Student's t).",
         ]
+        if np.isfinite(self.method_error):
+            text.append(
+                f"Estimated error of the method, not in the intervals: up to {100.0 * self.method_error:.2g} %."
+            )
         for key in ("source", "commit", "study_digest"):
             if self.attributes.get(key):
                 text.append(f"{key}: {' '.join(str(self.attributes[key]).split())}")
@@ -114,7 +121,9 @@ def curves_of(dataset: xarray.Dataset, at: Mapping[str, str]) -> tuple[list[Curv
     confidence = float(dataset.attrs.get("confidence_level", 0.95))
     units = {str(name): str(dataset[name].attrs.get("units", "1")) for name in values.coords if name in dataset}
     with_units = {name: unit for name, unit in units.items() if unit != "1"}
-    return curves, Source(str(study.get("name", "")), confidence, dict(dataset.attrs), with_units)
+    k = values["conductivity_mean"]
+    error = float((values["method_error"] / k.where(k > 0.0)).max())
+    return curves, Source(str(study.get("name", "")), confidence, dict(dataset.attrs), with_units, error)
 
 
 def _curve(cell: xarray.Dataset, fixed: Mapping[str, Any]) -> Curve:
