@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A study on this machine, one rank a core:  jobs/local.sh studies/NAME/study.toml out.nc [RANKS]
 #
-# Run it again to go on after an interruption.
+# Run it again to continue after an interruption.
 set -euo pipefail
 
 study=${1:?usage: jobs/local.sh STUDY.toml OUTPUT.nc [RANKS]}

@@ -26,9 +26,9 @@ async function ask(path, options = {}) {
   if (token) headers.Authorization = `Bearer ${token}`;
   let answer;
   try { answer = await fetch(path, { ...options, headers }); }
-  catch { throw new Refusal(0, { error: "The service does not answer. This page goes on asking." }); }
+  catch { throw new Refusal(0, { error: "The service does not answer. This page keeps trying." }); }
   if (answer.ok) return answer;
-  let problem = { error: `The service answers ${answer.status}.` };
+  let problem = { error: `The service returned ${answer.status}.` };
   try { problem = await answer.json(); } catch { /* not from the service itself */ }
   if (answer.status === 401) {
     $("token").hidden = false;
