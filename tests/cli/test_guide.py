@@ -50,7 +50,8 @@ def test_the_guide_builds_without_a_warning(tmp_path):
     done = subprocess.run([*map(str, line)], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "site" / "site" / "api.html").read_text()
-    rooms = ("comparison", "materials", "models", "packing", "realization", "solvers")
+    rooms = ("comparison", "materials", "models", "packing", "realization", "solvers", "solvers.marching")
+    rooms += ("engines.voxel", "engines.meshless", "output.figures", "output.exports")
     public = set(package.__all__)
     for room in rooms:
         module = importlib.import_module(f"etc_engine.{room}")
