@@ -154,6 +154,8 @@ def _record(
     if ranks.rank == 0:
         for message in excess_warnings(result.tensor, census.most_conductive):
             click.echo(f"etc-engine: warning: {message}", err=True)
+        if census.doubt is not None:
+            click.echo(f"etc-engine: warning: {census.doubt.sentence(gap, bonded=asked.takes_gap)}", err=True)
     percolates = bool(result.spans[axis])
     status = Status.OK if percolates else Status.NOT_PERCOLATING
     record: dict[str, Any] = {

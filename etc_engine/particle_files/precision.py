@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from etc_engine.arrays import Floats
+from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.packing.neighbors import neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.table import ParticleTable
@@ -46,7 +47,13 @@ class Doubt:
         )
 
 
-def doubtful_contacts(table: ParticleTable, relative_gap: float = 0.0) -> Doubt | None:
+def doubtful_contacts(
+    table: ParticleTable,
+    relative_gap: float = 0.0,
+    *,
+    counts: Callable[[Ints, Ints], Flags] | None = None,
+    places: Floats | None = None,
+) -> Doubt | None:
     r"""Contacts that the printed digits of the file do not decide.
 
     A contact is in doubt if its gap g is within two steps of the threshold, :math:`|g - g_t| \le 2 s`, where the
@@ -58,6 +65,10 @@ def doubtful_contacts(table: ParticleTable, relative_gap: float = 0.0) -> Doubt 
     table : ParticleTable
     relative_gap : float
         Threshold of the contact rule, in mean radii of the pair: 0 for overlaps, the bond gap for bonds.
+    counts : callable, optional
+        (rows i, rows j) -> whether the pair counts; of a particle and a wall, i is j. All count by default.
+    places : ndarray, shape (n, d), optional [m]
+        Coordinates as the file prints them, where those of the packing are of periodic images.
 
     Returns
     -------
@@ -71,7 +82,7 @@ def doubtful_contacts(table: ParticleTable, relative_gap: float = 0.0) -> Doubt 
     if table.printed is None:
         return None
     packing = table.packing
-    steps, radius_steps = _steps(table)
+    steps, radius_steps = _steps(table, places)
     reach = 2.0 * (float(steps.sum(axis=1).max()) + float(radius_steps.max()))
     near = neighbor_pairs(packing, gap=reach, relative_gap=relative_gap)
     i, j = near.pairs.T
@@ -82,23 +93,30 @@ def doubtful_contacts(table: ParticleTable, relative_gap: float = 0.0) -> Doubt 
     two_steps = ((steps[i] + steps[j]) * normals).sum(axis=1) + radius_steps[i] + radius_steps[j]
     mean = 0.5 * (packing.radii[i] + packing.radii[j])
     doubtful = (np.abs(near.gaps - relative_gap * mean) <= two_steps) & (np.abs(near.gaps) > TANGENT * mean)
-    wall_steps = _wall_doubts(packing, steps, radius_steps, relative_gap)
+    rows = np.arange(packing.count)
+    counted = np.ones(packing.count, dtype=np.bool_) if counts is None else counts(rows, rows)
+    wall_steps = _wall_doubts(packing, steps, radius_steps, relative_gap, counted)
+    if counts is not None:
+        doubtful &= counts(i, j)
     if not doubtful.any() and not wall_steps.size:
         return None
     half = np.concatenate([0.5 * two_steps[doubtful], 0.5 * wall_steps])
     return Doubt(int(doubtful.sum()), int(wall_steps.size), float(np.median(half)), table.printed.remedy)
 
 
-def _steps(table: ParticleTable) -> tuple[Floats, Floats]:
+def _steps(table: ParticleTable, places: Floats | None) -> tuple[Floats, Floats]:
     """Printed step of each coordinate, shape (n, d), and of each radius, shape (n,) [m]."""
     packing, printed = table.packing, table.printed
     assert printed is not None
-    places = packing.centers + np.array(table.origin or (0.0,) * packing.dimension)
+    if places is None:
+        places = packing.centers + np.array(table.origin or (0.0,) * packing.dimension)
     columns = [printed.positions[axis].step(places[:, axis]) for axis in range(packing.dimension)]
     return np.stack(columns, axis=1), printed.radius.step(packing.radii)
 
 
-def _wall_doubts(packing: ParticlePacking, steps: Floats, radius_steps: Floats, relative_gap: float) -> Floats:
+def _wall_doubts(
+    packing: ParticlePacking, steps: Floats, radius_steps: Floats, relative_gap: float, counted: Flags
+) -> Floats:
     """Two steps of each gap between a particle and a wall that is in doubt."""
     found = [np.zeros(0)]
     for axis in np.flatnonzero(~np.array(packing.box.periodic)):
@@ -106,5 +124,5 @@ def _wall_doubts(packing: ParticlePacking, steps: Floats, radius_steps: Floats, 
         for distance in (packing.centers[:, axis], packing.box.lengths[axis] - packing.centers[:, axis]):
             gap = distance - packing.radii
             doubtful = np.abs(gap - relative_gap * packing.radii) <= two_steps
-            found.append(two_steps[doubtful & (np.abs(gap) > TANGENT * packing.radii)])
+            found.append(two_steps[counted & doubtful & (np.abs(gap) > TANGENT * packing.radii)])
     return np.concatenate(found)

@@ -21,6 +21,7 @@ from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import RULES, find_rule
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.collection import PackingSource
+from etc_engine.particle_files.digits import PrintedColumns
 from etc_engine.particle_files.parts import extremes, read_part
 from etc_engine.particle_files.sample import Sample, sample_box
 from etc_engine.ranks import Ranks, together
@@ -45,6 +46,10 @@ class ScatteredFile:
     radii : ndarray, shape (n,) [m]
     conductivity : ndarray, shape (n,) [W/(m K)], optional
         Of the file's column.
+    origin : tuple of float [m]
+        Low corner of the box in the coordinates of the file.
+    printed : PrintedColumns, optional
+        How finely the numbers are printed in a text file.
     notes : tuple of str
         What the reader decided, a sentence each; the same on every rank.
     """
@@ -53,6 +58,8 @@ class ScatteredFile:
     centers: Floats
     radii: Floats
     conductivity: Floats | None
+    origin: tuple[float, ...]
+    printed: PrintedColumns | None
     notes: tuple[str, ...]
 
 
@@ -79,7 +86,8 @@ def read_scattered(path: Path, sample: Sample, ranks: Ranks) -> ScatteredFile:
     bounds, periodic, notes = together(ranks, lambda: sample_box(ends, sample))
     box = Box(tuple((bounds[:, 1] - bounds[:, 0]).tolist()), periodic)
     centers = rows.positions[:, : len(bounds)] - bounds[:, 0]
-    return ScatteredFile(box, centers, rows.radii, rows.conductivity, (*rows.notes, *notes))
+    origin, printed = tuple(bounds[:, 0].tolist()), ranks.share(rows.printed)[0]
+    return ScatteredFile(box, centers, rows.radii, rows.conductivity, origin, printed, (*rows.notes, *notes))
 
 
 def check_distributed(conduction: Conduction, rule: str, ranks: Ranks) -> None:
@@ -141,7 +149,7 @@ def solve_scattered(
     given = file.conductivity if conductivity is None else np.full(file.radii.size, conductivity)
     if given is None:
         raise InputError("the particles have no column of conductivities: give them one")
-    particles = Scattered(file.box, file.centers, file.radii, given)
+    particles = Scattered(file.box, file.centers, file.radii, given, file.origin, file.printed)
     return engine.distribute(particles, contacts, conduction, ranks, gap=gap)
 
 

@@ -15,6 +15,9 @@ from etc_engine.medium.conduction import Conduction
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts, radius_contacts
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files.digits import Digits, PrintedColumn, PrintedColumns
+from etc_engine.particle_files.precision import Doubt, doubtful_contacts
+from etc_engine.particle_files.table import ParticleTable
 from etc_engine.sweep.scheduler import connect
 
 RULES = {
@@ -60,13 +63,17 @@ def compare(ranks) -> list[dict[str, object]]:
         if packing.count < ranks.size:
             continue
         mine = np.random.default_rng(11).integers(ranks.size, size=packing.count) == ranks.rank  # any rank, any order
-        part = Scattered(packing.box, packing.centers[mine], packing.radii[mine], kappa[mine])
+        digits = PrintedColumn(Digits(3, 3))  # as if the file printed three digits
+        printed = PrintedColumns((digits,) * packing.dimension, digits)
+        particles = packing.centers[mine], packing.radii[mine], kappa[mine]
+        part = Scattered(packing.box, *particles, printed=printed)
         result, census = distributed_conductivity(part, contacts, Conduction(), ranks, gap=gap)
         if ranks.rank:
             continue
         network = contacts(packing)
         whole = element_conductivity(Medium(packing, kappa, network))
         scale = max(float(np.nanmax(whole.tensor)), 1e-300)
+        doubt = doubtful_contacts(ParticleTable(packing, printed=printed), gap)
         counts = network.count, [network.walls_of(axis).size for axis in range(packing.dimension)]
         found.append(
             {
@@ -78,11 +85,16 @@ def compare(ranks) -> list[dict[str, object]]:
                 "unknowns": [result.unknowns, whole.unknowns],
                 "contacts": [[census.contacts, census.wall_contacts.tolist()], [counts[0], counts[1]]],
                 "particles": [census.particles, packing.count],
+                "doubts": [_doubts(census.doubt), _doubts(doubt)],
                 "density": [census.density, packing.density],
                 "energy_error": result.relative_energy_error,
             }
         )
     return found
+
+
+def _doubts(doubt: Doubt | None) -> list[int]:
+    return [0, 0] if doubt is None else [doubt.pairs, doubt.wall_pairs]
 
 
 def refusals(ranks) -> list[list[str]]:

@@ -95,7 +95,7 @@ def test_many_ranks_agree_with_one(count):
         assert case["error"] < 1e-9, case  # both solve to 1e-10
         assert case["energy_error"] <= 1e-10
         assert case["same_gaps"] and case["same_spans"], case
-        for key in ("unknowns", "contacts", "particles"):
+        for key in ("unknowns", "contacts", "particles", "doubts"):
             assert case[key][0] == case[key][1], case
         assert case["density"][0] == pytest.approx(case["density"][1], rel=1e-12)
     for errors, words in zip(

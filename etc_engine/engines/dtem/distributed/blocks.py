@@ -75,7 +75,9 @@ class Part:
         return np.concatenate([own, *ranks.exchange([own[rows] for rows in self.sent])])
 
 
-def make_part(box: Box, centers: Floats, radii: Floats, conductivity: Floats, gap: float, ranks: Ranks) -> Part:
+def make_part(
+    box: Box, centers: Floats, radii: Floats, conductivity: Floats, gap: float, ranks: Ranks, margin: float = 0.0
+) -> Part:
     """Give every particle to the rank of its block, and copies to the ranks near it.
 
     Parameters
@@ -88,6 +90,8 @@ def make_part(box: Box, centers: Floats, radii: Floats, conductivity: Floats, ga
     gap : float
         Largest gap of a contact, in mean radii of the pair.
     ranks : Ranks
+    margin : float [m]
+        How much farther than contacts reach copies are taken.
 
     Raises
     ------
@@ -106,7 +110,7 @@ def make_part(box: Box, centers: Floats, radii: Floats, conductivity: Floats, ga
         raise InputError(
             f"{ranks.size} ranks are too many for {sum(counts)} particles: {counts.count(0)} of their blocks hold none"
         )
-    return _with_copies(box, held, np.concatenate([[0], np.cumsum(counts)]), gap, ranks)
+    return _with_copies(box, held, np.concatenate([[0], np.cumsum(counts)]), gap, ranks, margin)
 
 
 def _check(box: Box, centers: Floats, radii: Floats) -> None:
@@ -159,20 +163,22 @@ def _owners(centers: Floats, grid: tuple[int, ...], ranks: Ranks) -> Ints:
     return owner
 
 
-def _with_copies(box: Box, held: Floats, firsts: Ints, gap: float, ranks: Ranks) -> Part:
+def _with_copies(box: Box, held: Floats, firsts: Ints, gap: float, ranks: Ranks, margin: float) -> Part:
     d, numbers = box.dimension, np.arange(*firsts[ranks.rank : ranks.rank + 2])
     centers, radii = held[:, :d], held[:, d]
     low, high = centers.min(axis=0), centers.max(axis=0)
     blocks = ranks.share((low, high, float(radii.max())))
     widest = max(block[2] for block in blocks)
     lengths = np.asarray(box.lengths)
-    most = np.where(box.periodic, 1 + (2.0 * widest * (1.0 + 0.5 * gap) / lengths).astype(np.int64), 0).tolist()
+    most = np.where(
+        box.periodic, 1 + ((2.0 * widest * (1.0 + 0.5 * gap) + margin) / lengths).astype(np.int64), 0
+    ).tolist()
     shifts = [np.array(shift) for shift in product(*(range(-n, n + 1) for n in most))]
     sent: list[Ints] = []
     copies: list[tuple[Floats, Ints, Ints]] = []
     for rank, (block_low, block_high, largest) in enumerate(blocks):
-        reach = (largest + radii) * (1.0 + 0.5 * gap) * SLACK
-        farthest = (largest + radii.max()) * (1.0 + 0.5 * gap) * SLACK
+        reach = (largest + radii) * (1.0 + 0.5 * gap) * SLACK + margin
+        farthest = (largest + radii.max()) * (1.0 + 0.5 * gap) * SLACK + margin
         rows, images = [np.zeros(0, dtype=np.int64)], [np.zeros((0, d), dtype=np.int64)]
         for shift in shifts:
             moved = shift * lengths
