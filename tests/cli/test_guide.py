@@ -16,6 +16,7 @@ import pytest
 
 import etc_engine as package
 from etc_engine.cli import cli
+from etc_engine.models import CATALOGUE
 from etc_engine.study.sweep import parse_study
 from etc_engine.sweep.plan import needed_realizations
 from etc_engine.sweep.result_file import write_dataset
@@ -66,6 +67,7 @@ def test_one_version_everywhere():
 
 def test_the_first_page_is_one_screen():
     lines = (ROOT / "README.md").read_text().splitlines()
+    assert f"| {len(CATALOGUE)} closed-form models and bounds to compare with | yes | yes |" in lines
     assert len(lines) <= 120
     assert [line for line in lines if len(line) > 110] == []
 
