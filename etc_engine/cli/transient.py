@@ -47,7 +47,7 @@ def transient_command(
     content, text = read_study(study)
     if overwrite and resume:
         raise InputError("--resume continues with what is there and --overwrite replaces it: choose one")
-    if output.exists() and not (overwrite or resume):
+    if output.is_file() and not (overwrite or resume):
         raise OutputError(f"{output} exists: choose another name or give --overwrite")
     if not output.parent.is_dir():
         raise OutputError(f"the folder {output.parent} does not exist: create it first")
