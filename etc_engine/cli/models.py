@@ -84,7 +84,7 @@ def _print_list(records: list[dict[str, Any]]) -> None:
         inputs = ", ".join(item["name"] if item["required"] else f"[{item['name']}]" for item in record["inputs"])
         click.echo(f"{record['model']:24s}{dimensions:8s}{record['kind']:13s}{inputs}")
         click.echo(f"{'':24s}{record['reference']}")
-    click.echo("Inputs in brackets have a default. etc-engine models NAME tells more of one.")
+    click.echo("Inputs in brackets have a default. etc-engine models NAME prints one in full.")
 
 
 def _print_record(record: dict[str, Any]) -> None:

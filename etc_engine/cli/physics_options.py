@@ -176,7 +176,7 @@ class PhysicsWords:
         Raises
         ------
         InputError
-            If the rule is unknown, or an option that it needs is missing, or one means nothing to it.
+            If the rule is unknown, or an option that it needs is missing, or one has no effect with it.
         """
         from etc_engine.errors import InputError
         from etc_engine.medium.rules import find_rule
@@ -196,7 +196,7 @@ class PhysicsWords:
         used = set(rule.keys) | ({"youngs_modulus", "poisson_ratio"} if self.roughness else set())
         for name in given:
             if name not in used:
-                raise InputError(f"{_option(name)} means nothing to the contact rule {word}")
+                raise InputError(f"{_option(name)} has no effect with the contact rule {word}")
         if rule.takes_gap:
             given["bond_gap"] = bond_gap
         elastic = ("youngs_modulus", "poisson_ratio") if self.simulated_modulus is not None else ()

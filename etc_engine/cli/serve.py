@@ -65,8 +65,8 @@ def serve_command(
 ) -> None:
     """Serve studies and single solves over HTTP, with a web page.
 
-    Studies wait in a queue and run one after the other as `sweep --resume` under mpiexec, or through Slurm. Killed or
-    stopped at any moment, the service goes on where it was when it is started again. Needs the extra 'service'.
+    Studies wait in a queue and run one after the other as `sweep --resume` under mpiexec, or through Slurm. The service
+    may be stopped or killed at any moment and continues after a restart. Needs the extra 'service'.
     """
     try:
         from etc_engine.service.server import serve

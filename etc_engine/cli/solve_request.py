@@ -51,7 +51,7 @@ class SolveRequest:
                 raise InputError(
                     "--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap"
                 )
-            raise InputError(f"--bond-gap means nothing to the contact rule {self.rule}: leave it out")
+            raise InputError(f"--bond-gap has no effect with the contact rule {self.rule}: leave it out")
         self.physics.refuse_two_resistances(self.contact_resistance)
 
     @property

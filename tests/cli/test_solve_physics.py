@@ -115,15 +115,15 @@ def test_the_help_names_every_method(capfd):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--rule", "hertz", "--bond-gap", "0.1"], "--bond-gap means nothing to the contact rule hertz"),
+        (["--rule", "hertz", "--bond-gap", "0.1"], "--bond-gap has no effect with the contact rule hertz"),
         (["--rule", "hertzian"], "unknown contact rule"),
         (["--rule", "load"], "also needs --load"),
-        (["--rule", "overlap", "--youngs-modulus", "1e9"], "means nothing to the contact rule overlap"),
+        (["--rule", "overlap", "--youngs-modulus", "1e9"], "has no effect with the contact rule overlap"),
         (["--rule", "hertz", "--simulated-modulus", "1e8"], "also needs --youngs-modulus"),
         (["--load", "1e6", "--youngs-modulus", "90e9"], "also needs --poisson-ratio"),
         (["--rule", "coordination", "--contact-angle", "5"], "also needs --coordination"),
         (["--rule", "coordination", "--coordination", "6"], "also needs --contact-angle"),
-        (["--rule", "hertz", "--coordination", "6"], "--coordination means nothing to the contact rule hertz"),
+        (["--rule", "hertz", "--coordination", "6"], "--coordination has no effect with the contact rule hertz"),
         (["--roughness", "1e-6"], "takes height, slope and hardness"),
         (["--gas", "helium", "--pressure", "1e5"], "needs a temperature"),
         (["--gas", "helium", "--pressure", "1e5", "--temperature", "300", "--pore-conductivity", "1"], "leave one"),
