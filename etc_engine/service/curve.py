@@ -33,8 +33,9 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
         ``title`` and ``values``, the density unless it has one value and the temperature, or another quantity, several.
         ``solid_fraction`` over the densities and ``series``: ``values`` of the other dimensions of the sweep, in words
         too as ``name``, ``mean``, ``low``, ``high`` [W/(m K)] and ``count`` along that dimension.
-        ``models`` with their curves, ``remark`` where there are none, ``bounds_broken``. A missing number
-        is None.
+        ``method_error``: the largest estimated relative error of the method, which low and high do not hold.
+        ``models`` with their curves, ``remark`` where there are none, ``bounds_broken``, ``best_model`` and
+        ``within_error``: names of the estimates inside the error of the simulation. A missing number is None.
     """
     units = int((dataset["worker_rank"].values >= 0).sum())
     found: dict[str, Any] = {"units": units, "confidence": float(dataset.attrs["confidence_level"])}
@@ -43,10 +44,13 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     title = heading_of(along, dataset[along].attrs)
     found["along"] = {"name": along, "title": title, "values": plain(dataset[along].values)}
     found |= {"series": [], "models": [], "solid_fraction": [], "remark": "", "bounds_broken": False}
+    found |= {"method_error": None, "best_model": "", "within_error": []}
     if not units:
         return found
     statistics = simulated(dataset)
     found["solid_fraction"] = plain(_over(statistics["solid_fraction"], "density"))
+    k = statistics["conductivity_mean"]
+    found["method_error"] = plain((statistics["method_error"] / k.where(k > 0.0)).max().values)
     found["series"] = [
         _series(statistics.isel(place), [name for name in place if name != "density"])
         for place in _places(statistics, along)
@@ -59,6 +63,7 @@ def curve_of(dataset: xarray.Dataset) -> dict[str, Any]:
     found["models"] = _models(comparison, along)
     found["bounds_broken"] = bool(comparison.attrs["bound_broken"])
     found["best_model"] = str(comparison.attrs["best_model"])
+    found["within_error"] = str(comparison.attrs["within_error"]).split()
     return found
 
 

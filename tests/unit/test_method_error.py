@@ -12,7 +12,8 @@ from etc_engine.comparison.closest import closest_words
 from etc_engine.comparison.fits import Parameter
 from etc_engine.models import evaluate
 from etc_engine.output.figures import draw_comparison
-from etc_engine.sweep.result_file import write_dataset
+from etc_engine.service.curve import curve_of
+from etc_engine.sweep.result_file import open_dataset, write_dataset
 
 FILLED = """
 schema = 2
@@ -122,6 +123,9 @@ def test_table_json_figure_and_report_show_the_error(made_sweep, tmp_path, etc_e
     assert etc_engine("report", path, "-o", page).returncode == 0
     assert "method error [%]" in page.read_text()
     assert "<td>5.00</td>" in page.read_text()
+    curve = curve_of(open_dataset(path))
+    assert curve["method_error"] == pytest.approx(0.05)
+    assert (curve["best_model"], curve["within_error"]) == ("", ["differential"])
     comparison = evaluate_models(dataset)
     figure = draw_comparison(comparison, model_lines(comparison))
     narrow, wide = (band.get_paths()[0].vertices[:, 1] for band in figure.axes[0].collections[:2])

@@ -238,7 +238,8 @@ function study(id) {
     const level = Math.round(100 * curve.confidence);
     plot.replaceChildren(svg, h("ul", { class: "legend" }, legend.map(([name, sample]) => h("li", {}, sample, name))),
       h("figcaption", {}, `Mean over ${curve.units} packings${curve.complete ? "" : " so far"}, with the ${level} % Student-t interval of the mean: ` +
-        "bands and bars. Packings without a path count as 0. Dashed: models."));
+        "bands and bars. Packings without a path count as 0. Dashed: models." + (curve.method_error === null ? "" :
+        ` Estimated error of the method, not in the bands: up to ${(100 * curve.method_error).toPrecision(2)} %.`)));
     fillTable(curve);
     fillModels(curve);
   }
@@ -258,7 +259,8 @@ function study(id) {
         onchange: event => { event.target.checked ? shown.add(model.name) : shown.delete(model.name); drawFigure(curve); } })),
       h("td", { class: "text" }, h("label", { for: `show-${model.name}` }, model.title)), h("td", { class: "text" }, model.kind),
       h("td", {}, model.rms_relative_difference === null ? "–" : `${(100 * model.rms_relative_difference).toPrecision(3)} %`),
-      h("td", { class: "text" }, model.note || (model.name === curve.best_model ? "closest estimate" : ""))));
+      h("td", { class: "text" }, model.note || (model.name === curve.best_model ? "closest estimate" :
+        curve.within_error.includes(model.name) ? "inside the error of the simulation" : ""))));
     models.replaceChildren(curve.remark ? h("p", { class: "faint" }, curve.remark) : h("div", { class: "wide" }, h("table", {},
       h("thead", {}, h("tr", {}, h("th", {}, "draw"), h("th", { class: "text" }, "model"), h("th", { class: "text" }, "kind"),
         h("th", {}, "rms difference"), h("th", { class: "text" }, "remark"))), h("tbody", {}, rows))));
