@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,13 @@ from etc_engine.laws.radiation import grey_exchange
 from etc_engine.laws.roughness import Roughness, area_resistance
 from etc_engine.materials import gas_state, jump_length, pore_conductivity
 from etc_engine.medium.facets import FacetLinks, facet_links
+from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.particle_files.formats import read_particles
+from etc_engine.realization import effective_conductivity
+
+VOXELS = 96
+"""Along the edge of a bed, 12 along the diameter of a sphere."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,7 @@ class Bed:
     def __init__(self, path: Path) -> None:
         packing = read_particles(path).packing
         network = overlap_contacts(packing)
+        self.packing = packing
         self.links: FacetLinks = facet_links(network)
         self.density = packing.density
         self.coordination = 2.0 * network.count / packing.count
@@ -77,3 +84,9 @@ class Bed:
         )
         material = uniform_material(links, c.solid, fluid, jumps / c.diameter, glow * c.diameter, open_fluid=in_pores)
         return float(np.trace(facet_conductivity(links, material, tolerance=1e-6).tensor)) / 3.0
+
+    @cache  # noqa: B019 - three beds
+    def by_voxels(self, contrast: float) -> float:
+        """k/k_f where solid and fluid are alike: facet links are up to 2.4 % low there, or do not take the solid."""
+        medium = Medium(self.packing, contrast, pores=Pores(1.0))
+        return effective_conductivity(medium, engine="voxel", resolution=VOXELS).mean
