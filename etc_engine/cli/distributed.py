@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 PATIENCE = 30.0
 """Seconds that a rank with an error waits for the others to have it too."""
 HELP = (
-    "All ranks of mpirun solve one packing together, each a part of it; needs petsc4py. Takes a dump, CSV or netCDF, "
-    "method chord, and the rules overlap, bonded and radius; writes no files."
+    "All ranks of mpirun solve one packing together, each a part of it. Needs petsc4py. Takes a dump, CSV or netCDF, "
+    "method chord, and the rules overlap, bonded and radius. Writes no files."
 )
 
 

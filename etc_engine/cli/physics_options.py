@@ -35,7 +35,7 @@ OPTIONS = (
     click.option(
         "--area-resistance",
         type=float,
-        help="Resistance of a unit of contact area, walls included [m2 K/W]; exact of disks resolves it.",
+        help="Resistance of a unit of contact area, walls included [m2 K/W]. Method exact resolves it for disks.",
     ),
     click.option("--roughness", help="Height [m], slope and hardness [Pa] of rough contacts: 1e-6,0.1,4e9."),
     click.option("--material", help="Solid by name, see etc-engine materials. Needs --temperature."),
@@ -46,7 +46,7 @@ OPTIONS = (
     click.option(
         "--emissivity",
         type=float,
-        help="Emissivity of the particles. Facing surfaces of neighbours radiate; rays past neighbours are left out.",
+        help="Emissivity of the particles. Facing surfaces of neighbours radiate. Rays past neighbours are left out.",
     ),
     click.option(
         "--wall-temperatures",
