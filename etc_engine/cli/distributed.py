@@ -166,6 +166,7 @@ def _record(
     }
     if all(file.box.periodic):
         record["conductivity_tensor"] = result.tensor
+    record["model_error_estimate"] = result.model_error
     return record | {
         "particles": census.particles,
         "density": census.density,

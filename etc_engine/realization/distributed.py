@@ -166,8 +166,8 @@ def realize_together(spec: RealizationSpec, ranks: Ranks) -> Realization:
     Returns
     -------
     Realization
-        The same on every rank. Its solid fraction is NaN, which takes the whole packing; so are the mean field and the
-        estimated error of its cells.
+        The same on every rank. Its solid fraction is NaN, which takes the whole packing; so is the mean field of its
+        cells.
 
     Raises
     ------
@@ -224,6 +224,7 @@ def _cell(
         iterations=result.iterations,
         relative_energy_error=result.relative_energy_error,
         solve_seconds=time.perf_counter() - start,
+        model_error_estimate=result.model_error,
         solved_by="full",
     )
     return outcome, census

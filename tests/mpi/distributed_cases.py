@@ -87,6 +87,7 @@ def compare(ranks) -> list[dict[str, object]]:
                 "particles": [census.particles, packing.count],
                 "doubts": [_doubts(census.doubt), _doubts(doubt)],
                 "density": [census.density, packing.density],
+                "model_error": [result.model_error, whole.model_error],
                 "energy_error": result.relative_energy_error,
             }
         )

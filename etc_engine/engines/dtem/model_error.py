@@ -53,10 +53,28 @@ def chord_error_terms(solution: SteadySolution, load: int = 0) -> Floats:
     if energy == 0.0:
         return np.zeros(3)
     kappa = solution.medium.conductivity
+    segments, moments, slopes = disk_terms(sides, kappa, solution.heat_flows[:, load])
+    return np.array([segments, moments, _slope_term(sides, kappa, slopes)]) / energy
+
+
+def disk_terms(sides: ContactSides, kappa: Floats, flows: Floats) -> tuple[float, float, Floats]:
+    """S and M of some disks, and the slope G a of each side, shape (s,)."""
     slopes = np.zeros(sides.nodes.size)
-    flows = np.ascontiguousarray(solution.heat_flows[:, load])
-    terms = np.array(_terms(disk_contacts(sides, kappa), flows, slopes))
-    return np.append(terms, _slope_term(sides, kappa, slopes)) / energy
+    segments, moments = _terms(disk_contacts(sides, kappa), np.ascontiguousarray(flows), slopes)
+    return segments, moments, slopes
+
+
+def least_error(sides: ContactSides, flows: Floats) -> tuple[float, float]:
+    """Sums of sin^4 alpha over the sides with their heat flows, and of these."""
+    size = np.abs(flows)
+    return float((size * np.sin(sides.alpha) ** 4).sum()), float(size.sum())
+
+
+def disk_estimate(terms: Floats, weighted: float, total: float) -> float:
+    """The estimate of `chord_error_estimate` for disks, from S, M, J over the energy and the sums of `least_error`."""
+    parts = np.multiply(COEFFICIENTS, terms) * [1.0, 1.0, -1.0]
+    rest = LEAST * weighted / max(total, np.finfo(float).tiny)
+    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest)
 
 
 def _slope_term(sides: ContactSides, kappa: Floats, slopes: Floats) -> float:
@@ -114,10 +132,8 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     if solution.sides.dimension == 3:
         kappa, energy = solution.medium.conductivity, float(solution.energies[load, load])
         return film + sphere_error_estimate(solution.sides, kappa, solution.heat_flows[:, load], energy)
-    parts = np.multiply(COEFFICIENTS, chord_error_terms(solution, load)) * [1.0, 1.0, -1.0]
-    flows = np.abs(solution.heat_flows[:, load])
-    rest = LEAST * (flows * np.sin(solution.sides.alpha) ** 4).sum() / max(float(flows.sum()), np.finfo(float).tiny)
-    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest + film)
+    sums = least_error(solution.sides, solution.heat_flows[:, load])
+    return disk_estimate(chord_error_terms(solution, load), *sums) + film
 
 
 def film_error(solution: SteadySolution, load: int = 0) -> float:
@@ -135,9 +151,14 @@ def film_error(solution: SteadySolution, load: int = 0) -> float:
     sides, kappa, energy = solution.sides, solution.medium.conductivity, float(solution.energies[load, load])
     if energy == 0.0:
         return 0.0
+    return film_energy(sides, kappa, solution.heat_flows[:, load]) / energy
+
+
+def film_energy(sides: ContactSides, kappa: Floats, flows: Floats) -> float:
+    """The error of `film_error` times the energy, from the heat flows into the particles at the sides, shape (s,)."""
     included, whole = uneven_film(sides, kappa), uneven_film(sides, kappa, lumped=True)
     left = np.maximum(whole - included, 0.0) + FILM_ALLOWANCE[sides.dimension] * whole
-    return float((solution.heat_flows[:, load] ** 2 * left).sum() / energy)
+    return float((flows**2 * left).sum())
 
 
 @njit(cache=True)

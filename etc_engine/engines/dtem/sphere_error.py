@@ -42,10 +42,7 @@ def crossing_and_crowding(sides: ContactSides, kappa: Floats, flows: Floats, ene
     energy : float [W K]
         Of the same solution.
     """
-    normals = sides.arms / np.linalg.norm(sides.arms, axis=1, keepdims=True)
-    slopes = np.zeros((flows.size, 3))
-    scales = kappa * sides.radii**2
-    powers = _slopes(sides.offsets, normals, sides.alpha, np.ascontiguousarray(flows), scales, slopes)
+    powers, slopes = sphere_slopes(sides, kappa, flows)
     own, widths = kappa[sides.particles], sides.radii[sides.particles] * np.sin(sides.alpha)
     a, b = sides.of_contacts.T
     mean = 2.0 * own[a] * own[b] / (own[a] + own[b])
@@ -54,6 +51,20 @@ def crossing_and_crowding(sides: ContactSides, kappa: Floats, flows: Floats, ene
     crossing += 2.0 * (own[walls] * widths[walls] ** 3 * (slopes[walls] ** 2).sum(axis=1)).sum()
     total = float(np.abs(flows).sum())
     return float(4.0 / 3.0 * crossing / energy), float(powers / total)
+
+
+def sphere_slopes(sides: ContactSides, kappa: Floats, flows: Floats) -> tuple[float, Floats]:
+    """Sum of sixth powers with the heat flows of some spheres, and the slope G of each side, shape (s, 3)."""
+    normals = sides.arms / np.linalg.norm(sides.arms, axis=1, keepdims=True)
+    slopes = np.zeros((flows.size, 3))
+    scales = kappa * sides.radii**2
+    powers = _slopes(sides.offsets, normals, sides.alpha, np.ascontiguousarray(flows), scales, slopes)
+    return float(powers), slopes
+
+
+def sphere_estimate(crossing: float, crowding: float) -> float:
+    """2.5 (J + 0.011 <sum_j [(a_i + a_j)/gamma_ij]^6>) from its two terms."""
+    return ALLOWANCE * (crossing + CROWDING * crowding)
 
 
 def sphere_error_estimate(sides: ContactSides, kappa: Floats, flows: Floats, energy: float) -> float:
@@ -78,7 +89,7 @@ def sphere_error_estimate(sides: ContactSides, kappa: Floats, flows: Floats, ene
     if energy == 0.0:
         return 0.0
     crossing, crowding = crossing_and_crowding(sides, kappa, flows, energy)
-    return ALLOWANCE * (crossing + CROWDING * crowding)
+    return sphere_estimate(crossing, crowding)
 
 
 @njit(cache=True)

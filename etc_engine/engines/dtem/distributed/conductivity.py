@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -125,6 +125,7 @@ def distributed_conductivity(
         conduction.axes,
         lambda group: solve_part(nodes, group, ranks, method=conduction.method, tolerance=conduction.tolerance),
     )
+    result = replace(result, model_error=max(error for one in result.solutions for error in one.model_errors))
     return result, _census(nodes, particles, gap, ranks)
 
 

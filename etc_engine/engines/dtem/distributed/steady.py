@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.dtem.assembly import LinearSystem, assemble
+from etc_engine.engines.dtem.distributed.model_error import distributed_error
 from etc_engine.engines.dtem.distributed.nodes import Nodes
 from etc_engine.engines.dtem.distributed.spanning import distributed_backbone, pinned_nodes
 from etc_engine.engines.dtem.element import Elements
@@ -36,12 +37,15 @@ class PartialSolution:
         One per load.
     walls : (float, float)
         Heat flow in at the low wall and out at the far wall.
+    model_errors : tuple of float
+        Estimated relative error of the method, one per load.
     """
 
     backbone: Backbone
     energies: Floats
     reports: tuple[SolveReport, ...]
     walls: tuple[float, float]
+    model_errors: tuple[float, ...]
 
     def wall_heat(self) -> tuple[float, float]:
         """Heat flow into the particles at the low wall and out of them at the far wall [W, in 2D W/m]."""
@@ -85,7 +89,11 @@ def solve_part(
     at_wall = sides.nodes >= nodes.count
     ends = [flows[at_wall & (temperatures[:, 0] == end), 0].sum() for end in (1.0, 0.0)]
     heat = np.asarray(ranks.add_up(np.array(ends)))
-    return PartialSolution(backbone, energies, reports, (float(heat[0]), -float(heat[1])))
+    errors = tuple(
+        distributed_error(nodes, backbone, sides, flows[:, load], float(energies[load, load]), ranks)
+        for load in range(len(axes))
+    )
+    return PartialSolution(backbone, energies, reports, (float(heat[0]), -float(heat[1])), errors)
 
 
 def _own_system(
