@@ -234,3 +234,47 @@ def test_one_process_needs_no_mpi_at_all(study, tmp_path):
     done = ranks(0, "-c", code)
     assert done.returncode == 0, done.stderr
     assert open_dataset(tmp_path / "out.nc").sizes["realization"] == 6
+
+
+BETWEEN_WALLS = """
+schema = 2
+name = "between walls"
+seed = 20263
+[packing]
+method = "lubachevsky-stillinger"
+radii = "equal"
+count = 24
+box = [2e-3, 2e-3, 4e-3]
+periodic = "xy"
+density = 0.5
+[particles]
+material = "alumina"
+[pores]
+gas = "helium"
+pressure = [1e3, 1e5]
+accommodation = 0.4
+[radiation]
+emissivity = 0.6
+[conduction]
+temperature = 800.0
+nonlinear = true
+temperature_difference = [100.0, 600.0]
+[statistics]
+realizations = 3
+"""
+
+
+@needs_mpi
+@pytest.mark.slow
+def test_properties_at_the_local_temperature_have_the_same_bits_on_any_number_of_ranks(tmp_path):
+    pytest.importorskip("CoolProp")
+    (tmp_path / "study.toml").write_text(BETWEEN_WALLS)
+    found = []
+    for count in (0, 2, 3):
+        out = tmp_path / f"{count}.nc"
+        done = ranks(count, "-m", "etc_engine", "sweep", str(tmp_path / "study.toml"), "-o", str(out), timeout=600.0)
+        assert done.returncode == 0, done.stderr
+        found.append(open_dataset(out))
+    assert (found[0]["status"] == 0).all()
+    assert float(found[0]["heat_imbalance"].max()) < 1e-9
+    assert [differing_variables(found[0], other) for other in found[1:]] == [[], []]
