@@ -133,7 +133,7 @@ def _record(
     """What the ranks found, with the keys of ``solve`` on one rank."""
     from math import radians
 
-    from etc_engine.box import AXES
+    from etc_engine.cli.options import per_axis_and_tensor
     from etc_engine.cli.solve_request import load_axes
     from etc_engine.durable.provenance import peak_bytes
     from etc_engine.medium.sample_warnings import excess_warnings
@@ -162,15 +162,13 @@ def _record(
         "engine": asked.engine,
         "method": conduction.method,
         "conductivity": float(result.tensor[axis, axis]),
-        "conductivity_per_axis": {AXES[a]: float(result.tensor[a, a]) for a in axes},
+        **per_axis_and_tensor(result.tensor, axes),
     }
-    if all(file.box.periodic):
-        record["conductivity_tensor"] = result.tensor
     record["model_error_estimate"] = result.model_error
     return record | {
         "particles": census.particles,
         "density": census.density,
-        "fill_height": census.fill_height,
+        **({} if file.box.periodic[-1] else {"fill_height": census.fill_height}),
         "pore_conductivity": 0.0,
         "contact_rule": asked.rule,
         **asked.physics.record,
