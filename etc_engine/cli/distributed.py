@@ -134,9 +134,10 @@ def _record(
     from math import radians
 
     from etc_engine.cli.options import per_axis_and_tensor
+    from etc_engine.cli.particle_options import warn
     from etc_engine.cli.solve_request import load_axes
     from etc_engine.durable.provenance import peak_bytes
-    from etc_engine.medium.sample_warnings import excess_warnings
+    from etc_engine.medium.sample_warnings import excess_warnings, filling_warnings
     from etc_engine.realization import Status
     from etc_engine.realization.distributed import solve_scattered
 
@@ -152,10 +153,11 @@ def _record(
     peaks = ranks.share(peak_bytes())
     axis = axes[0]
     if ranks.rank == 0:
-        for message in excess_warnings(result.tensor, census.most_conductive):
-            click.echo(f"etc-engine: warning: {message}", err=True)
+        driven = [axis for axis in axes if not file.box.periodic[axis]]
+        warn(filling_warnings(census.filling, file.box, file.origin, driven, gap))
+        warn(excess_warnings(result.tensor, census.most_conductive, error=result.model_error))
         if census.doubt is not None:
-            click.echo(f"etc-engine: warning: {census.doubt.sentence(gap, bonded=asked.takes_gap)}", err=True)
+            warn([census.doubt.sentence(gap, bonded=asked.takes_gap)])
     percolates = bool(result.spans[axis])
     status = Status.OK if percolates else Status.NOT_PERCOLATING
     record: dict[str, Any] = {
@@ -168,7 +170,7 @@ def _record(
     return record | {
         "particles": census.particles,
         "density": census.density,
-        **({} if file.box.periodic[-1] else {"fill_height": census.fill_height}),
+        **({} if census.filling.fill_height is None else {"fill_height": census.filling.fill_height}),
         "pore_conductivity": 0.0,
         "contact_rule": asked.rule,
         **asked.physics.record,

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from etc_engine.box import AXES
+from etc_engine.box import AXES, Box
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.pores import VACUUM, Pores
 from etc_engine.particle_files.precision import doubtful_contacts
 from etc_engine.particle_files.table import ParticleTable
-from etc_engine.structure.filling import find_filling, free_walls
+from etc_engine.structure.filling import Filling, find_filling, free_walls
 
 EXCESS = 0.005
 """An excess below this part is the error of a method that solves particles and pores of nearly equal conductivity."""
@@ -65,13 +65,34 @@ def box_warnings(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) 
         Largest gap of a contact with a wall, in radii.
     """
     packing = table.packing
-    filling = find_filling(packing)
-    origin = table.origin or (0.0,) * packing.dimension
-    low, high = packing.radii.min(), packing.radii.max()
-    faces = [
-        f"{AXES[k // 2]} = {origin[k // 2] + (k % 2) * packing.box.lengths[k // 2]:g}" for k in range(2 * len(origin))
-    ]
-    free = set(free_walls(packing, filling).tolist())
+    return filling_warnings(find_filling(packing), packing.box, table.origin, driven, gap, table.cropped)
+
+
+def filling_warnings(
+    filling: Filling,
+    box: Box,
+    origin: tuple[float, ...],
+    driven: Sequence[int],
+    gap: float,
+    cropped: tuple[bool, ...] = (),
+) -> list[str]:
+    """The sentences of `box_warnings`, from what is known of a sample.
+
+    Parameters
+    ----------
+    filling : Filling
+    box : Box
+    origin : tuple of float [m]
+        Low corner of the box in the coordinates of the file; empty stands for zeros.
+    driven, gap
+        As of `box_warnings`.
+    cropped : tuple of bool
+        Whether each wall was made by a crop; empty stands for none.
+    """
+    origin = origin or (0.0,) * box.dimension
+    low, high = filling.radii
+    faces = [f"{AXES[k // 2]} = {origin[k // 2] + (k % 2) * box.lengths[k // 2]:g}" for k in range(2 * len(origin))]
+    free = set(free_walls(filling).tolist())
     found = []
     for wall, distance in enumerate(filling.free.tolist()):
         if wall // 2 in driven and distance > gap * low:
@@ -85,7 +106,7 @@ def box_warnings(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) 
                 f"{distance:.3g} m are free, which count as sample; see --crop and --box"
             )
     deep = filling.deep_cuts
-    made = np.array(table.cropped or (False,) * deep.size)
+    made = np.array(cropped or (False,) * deep.size)
     if deep[~made].any():
         where = ", ".join(f"{faces[k]} ({deep[k]})" for k in np.flatnonzero((deep > 0) & ~made))
         found.append(

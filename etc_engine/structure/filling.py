@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,11 +28,14 @@ class Filling:
         is touched or cuts; NaN along periodic axes.
     deep_cuts : ndarray of int, shape (2 d,)
         Particles of which each wall cuts off more than half a radius.
+    radii : (float, float) [m]
+        Smallest and largest radius.
     """
 
     extent: Floats
     free: Floats
     deep_cuts: Ints
+    radii: tuple[float, float]
 
     @property
     def fill_height(self) -> float | None:
@@ -62,12 +66,24 @@ def find_filling(packing: ParticlePacking) -> Filling:
     lengths, periodic = np.asarray(packing.box.lengths), np.repeat(packing.box.periodic, 2)
     free = np.stack([extent[:, 0], lengths - extent[:, 1]], axis=1).ravel()
     cut = np.stack([radii - centers, radii - (lengths - centers)], axis=2).reshape(packing.count, -1) > DEEP * radii
-    return Filling(extent, np.where(periodic, np.nan, free), np.where(periodic, 0, cut.sum(axis=0)))
+    ends = float(radii.min()), float(radii.max())
+    return Filling(extent, np.where(periodic, np.nan, free), np.where(periodic, 0, cut.sum(axis=0)), ends)
 
 
-def free_walls(packing: ParticlePacking, filling: Filling) -> Ints:
+def join_fillings(parts: Sequence[Filling]) -> Filling:
+    """The filling of a packing whose particles are in several parts, each in the whole box."""
+    lows, highs = zip(*(part.extent.T for part in parts), strict=True)
+    return Filling(
+        np.stack([np.min(lows, axis=0), np.max(highs, axis=0)], axis=1),
+        np.min([part.free for part in parts], axis=0),
+        np.sum([part.deep_cuts for part in parts], axis=0),
+        (min(part.radii[0] for part in parts), max(part.radii[1] for part in parts)),
+    )
+
+
+def free_walls(filling: Filling) -> Ints:
     """Walls with room for one more layer of the largest particles in front of them."""
-    return np.flatnonzero(filling.free > 2.0 * packing.radii.max())
+    return np.flatnonzero(filling.free > 2.0 * filling.radii[1])
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from etc_engine.particle_files.digits import PrintedColumns
 from etc_engine.particle_files.precision import Doubt, doubtful_contacts
 from etc_engine.particle_files.table import ParticleTable
 from etc_engine.ranks import Ranks, together
+from etc_engine.structure.filling import Filling, find_filling, join_fillings
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +60,8 @@ class Census:
         With the two walls normal to each axis.
     density : float
         Sum of the full particle areas (volumes) over the box's.
-    fill_height : float [m]
-        Highest surface along the last axis.
+    filling : Filling
+        Where its particles are in the box.
     most_conductive : float [W/(m K)]
         Largest conductivity of a particle.
     doubt : Doubt or None
@@ -71,7 +72,7 @@ class Census:
     contacts: int
     wall_contacts: Ints
     density: float
-    fill_height: float
+    filling: Filling
     most_conductive: float
     doubt: Doubt | None
 
@@ -134,12 +135,13 @@ def _census(nodes: Nodes, particles: Scattered, gap: float, ranks: Ranks) -> Cen
     own = part.packing.select(np.arange(part.own))
     sums = np.array([part.own, nodes.own, *np.bincount(walls // 2, minlength=part.box.dimension)])
     count, contacts, *at_walls = np.asarray(ranks.add_up(sums)).tolist()
-    last = own.centers[:, -1] + part.corner[-1] + own.radii
-    ends = ranks.share((float(own.measures.sum()), float(last.max()), float(part.conductivity[: part.own].max())))
-    measures, heights, conductivities = zip(*ends, strict=True)
+    places = np.clip(own.centers + part.corner, 0.0, part.box.lengths)  # rounding may leave the box
+    filling = find_filling(ParticlePacking(places, own.radii, part.box))
+    ends = ranks.share((float(own.measures.sum()), filling, float(part.conductivity[: part.own].max())))
+    measures, fillings, conductivities = zip(*ends, strict=True)
     doubts = ranks.share(together(ranks, lambda: _doubt(nodes.part, particles, gap)))
     density, doubt = sum(measures) / part.box.volume, _sum_of_doubts(doubts)
-    return Census(count, contacts, np.array(at_walls), density, max(heights), max(conductivities), doubt)
+    return Census(count, contacts, np.array(at_walls), density, join_fillings(fillings), max(conductivities), doubt)
 
 
 def _two_steps(particles: Scattered, ranks: Ranks) -> float:
