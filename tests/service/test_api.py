@@ -266,7 +266,7 @@ def test_refused_models(service, model, inputs, words):
         (("[contacts]", "[contact]"), "contact", "did you mean 'contacts'"),
         (("realizations = 3", "realizations = 100000"), "statistics.realizations", "this service allows 100000"),
         (("box = [1.0, 1.0]", "box = [1e6, 1e6]"), "packing.box", "this service allows 1000000"),
-        (("uniform:0.03:0.06", "equal:1e200"), "", "out of range"),
+        (("uniform:0.03:0.06", "equal:1e200"), "packing.radii", "expected 1e-15"),
         (("[packing]", "[packing"), "", "not valid TOML"),
         (("box = [1.0, 1.0]", "box = " + "[" * 5000), "", "not valid TOML"),
     ],
