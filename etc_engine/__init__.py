@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from etc_engine.packing import PackingSpec, ParticlePacking, pack, parse_radii
     from etc_engine.particle_files.csv_files import read_csv
     from etc_engine.particle_files.dumps import read_dump
+    from etc_engine.particle_files.particles import read_particles
     from etc_engine.realization import RealizationSpec, effective_conductivity, field_along, realize, transient_system
     from etc_engine.solvers.marching import march
     from etc_engine.structure.union import solid_fraction
@@ -64,6 +65,7 @@ _HOMES = {
     "parse_radii": "packing",
     "read_csv": "particle_files.csv_files",
     "read_dump": "particle_files.dumps",
+    "read_particles": "particle_files.particles",
     "realize": "realization",
     "field_along": "realization",
     "solid_fraction": "structure.union",
@@ -96,6 +98,7 @@ __all__ = [
     "parse_radii",
     "read_csv",
     "read_dump",
+    "read_particles",
     "realize",
     "solid_fraction",
     "transient_system",

@@ -129,9 +129,9 @@ def read_sample(path: Path, words: SampleWords, *, unknown_periodic: bool = Fals
     ------
     InputError, GeometryError
     """
-    from etc_engine.particle_files.formats import read_particles
+    from etc_engine.particle_files.formats import read_table
 
-    table = read_particles(path, sample=replace(words.sample(), unknown_periodic=unknown_periodic))
+    table = read_table(path, sample=replace(words.sample(), unknown_periodic=unknown_periodic))
     for note in table.notes:
         click.echo(f"etc-engine: note: {note}", err=True)
     return table if words.types is None else _by_type(table, words.types, path)

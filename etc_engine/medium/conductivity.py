@@ -96,6 +96,24 @@ class EffectiveConductivity(Generic[Solution]):
     picard_iterations: int = 0
 
     @property
+    def conductivity(self) -> float | Floats:
+        """The number k along the one axis that was asked for, or else the tensor [W/(m K)].
+
+        See `mean` for the mean over all axes.
+        """
+        diagonal = np.diag(self.tensor)
+        asked = np.isfinite(diagonal)
+        return float(diagonal[asked][0]) if asked.sum() == 1 else self.tensor
+
+    def __repr__(self) -> str:
+        """Conductivity along each axis, unknowns, and the error that the solver leaves."""
+        axes = [f"{AXES[a]} {k:.6g}" for a, k in enumerate(np.diag(self.tensor)) if np.isfinite(k)]
+        return (
+            f"<EffectiveConductivity: k along {', '.join(axes) or 'no axis'} W/(m K), {self.unknowns} unknowns, "
+            f"relative error of the solver {self.relative_energy_error:.1g}>"
+        )
+
+    @property
     def missing_axes(self) -> str:
         """Axes that nothing spans, as a word."""
         return "".join(AXES[axis] for axis, flag in enumerate(self.spans) if flag is False)

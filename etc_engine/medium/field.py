@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from etc_engine.arrays import Floats, Ints
+from etc_engine.box import AXES
 from etc_engine.medium.medium import Medium
 from etc_engine.medium.sides import ContactSides
 
@@ -59,3 +60,8 @@ class ParticleField:
     flow_modes: Floats
     inside: Inside | None = None
     reach: Floats | None = None
+
+    def __repr__(self) -> str:
+        """Load axis, particles and links."""
+        size = f"{self.particle_temperatures.size} particles and {self.contact_flows.size} links"
+        return f"<ParticleField: load along {AXES[self.axis]}, {size}>"

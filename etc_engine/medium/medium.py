@@ -73,6 +73,14 @@ class Medium:
         if self.network is not None and self.network.packing is not self.packing:
             raise InputError("the contact network must be of the packing of the medium: make both from the same one")
 
+    def __repr__(self) -> str:
+        """Particles, their conductivity, and what links them."""
+        low, high = float(self.conductivity.min()), float(self.conductivity.max())
+        k = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+        links = "no links" if self.network is None else f"{self.network.count} links by rule {self.network.rule}"
+        pores = f", pores of {self.pores.conductivity:.4g} W/(m K)" if self.pores.conduct else ""
+        return f"<Medium: {self.packing.count} particles of {k} W/(m K), {links}{pores}>"
+
     @property
     def box(self) -> Box:
         """The box of the packing."""

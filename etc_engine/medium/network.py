@@ -69,6 +69,13 @@ class ContactNetwork:
     rule: str
     area_resistances: Floats | None = None
 
+    def __repr__(self) -> str:
+        """Links between particles and with walls, and the rule that made them."""
+        return (
+            f"<ContactNetwork: {self.count} links of {self.packing.count} particles, {self.walls.size} with walls, "
+            f"rule {self.rule}>"
+        )
+
     @property
     def count(self) -> int:
         """Number of links between particles."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box, ball_measure
@@ -35,12 +37,17 @@ class ParticlePacking:
         Particle radii, positive.
     box : Box
         The box that holds them.
+    columns : mapping of str to ndarray of n rows, optional
+        What else is known of each particle, such as ``conductivity`` [W/(m K)], ``ids``, ``types`` and ``temperature``
+        [K] of a file. No function reads them by itself: ``Medium(packing, packing.columns["conductivity"], ...)``.
 
     Raises
     ------
     GeometryError
         If there is no particle, a value is not finite, a radius is not positive or a centre lies
         outside a wall; the message names the first offending particle (numbered from 0).
+    InputError
+        If a column has another number of rows.
 
     Examples
     --------
@@ -52,6 +59,7 @@ class ParticlePacking:
     centers: Floats
     radii: Floats
     box: Box
+    columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         centers, radii = np.asarray(self.centers, dtype=np.float64), np.asarray(self.radii, dtype=np.float64)
@@ -73,6 +81,17 @@ class ParticlePacking:
         _refuse_first(outside, f"has its centre outside the box {self.box.lengths}", centers)
         object.__setattr__(self, "centers", _frozen(centers))
         object.__setattr__(self, "radii", _frozen(radii))
+        for name, values in self.columns.items():
+            if np.shape(values)[:1] != radii.shape:
+                raise InputError(f"column {name!r} needs {radii.size} rows, found shape {np.shape(values)}")
+
+    def __repr__(self) -> str:
+        """Number and kind of the particles, density and box."""
+        kind = "disks" if self.dimension == 2 else "spheres"
+        lengths = " x ".join(f"{length:g}" for length in self.box.lengths)
+        walls = f"periodic along {self.box.periodic_axes}" if self.box.periodic_axes else "walls"
+        more = f", columns {', '.join(self.columns)}" if self.columns else ""
+        return f"<ParticlePacking: {self.count} {kind}, density {self.density:.4g}, box {lengths} m, {walls}{more}>"
 
     @property
     def count(self) -> int:
@@ -96,11 +115,12 @@ class ParticlePacking:
 
     def select(self, keep: Flags | Ints) -> ParticlePacking:
         """The packing of the particles picked by a mask or by row numbers, in that order."""
-        return ParticlePacking(self.centers[keep], self.radii[keep], self.box)
+        columns = {name: np.asarray(values)[keep] for name, values in self.columns.items()}
+        return ParticlePacking(self.centers[keep], self.radii[keep], self.box, columns)
 
     def with_radii(self, radii: Floats) -> ParticlePacking:
         """The same centres with other radii."""
-        return ParticlePacking(self.centers, radii, self.box)
+        return ParticlePacking(self.centers, radii, self.box, self.columns)
 
 
 def particle_values(values: ArrayLike, count: int, name: str) -> Floats:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from etc_engine.errors import InputError
-from etc_engine.particle_files.formats import count_frames, read_particles
+from etc_engine.particle_files.formats import count_frames, read_table
 from etc_engine.particle_files.sample import Sample
 from etc_engine.particle_files.table import ParticleTable
 
@@ -51,7 +51,7 @@ class PackingSource:
             If the file is gone, is another one than when the collection was made, or is not understood.
         """
         self.check()
-        return read_particles(self.path, sample=self.chosen())
+        return read_table(self.path, sample=self.chosen())
 
     def check(self) -> None:
         """Refuse a file that is another one than when the collection was made.

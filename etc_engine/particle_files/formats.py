@@ -145,7 +145,7 @@ def write_particles(path: Path | str, table: ParticleTable, attributes: Attribut
     write(Path(path), table, attributes or {})
 
 
-def read_particles(
+def read_table(
     path: Path | str, box: Box | None = None, frame: int | None = None, sample: Sample | None = None
 ) -> ParticleTable:
     """Particles of a file in any known format; the content of the file decides the format.

@@ -64,7 +64,7 @@ class ScatteredFile:
 
 
 def read_scattered(path: Path, sample: Sample, ranks: Ranks) -> ScatteredFile:
-    """Read a particle file on all ranks, each its part; the box is found as `read_particles` finds it.
+    """Read a particle file on all ranks, each its part; the box is found as `read_table` finds it.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ from etc_engine.medium.transient import HeatSource, ParticleSystem
 from etc_engine.medium.walls import knots_of, value_at
 from etc_engine.packing import ParticlePacking, pack
 from etc_engine.particle_files.dumps import read_trajectory
-from etc_engine.particle_files.formats import format_to_read, read_particles
+from etc_engine.particle_files.formats import format_to_read, read_table
 from etc_engine.particle_files.table import ParticleTable
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
@@ -280,7 +280,7 @@ def _particles(study: NetworkStudy, folder: Path) -> ParticleTable:
             raise StudyError(f"packing.files: there is no file {path}")
         if words.box is None and not format_to_read(path).brings_box:
             raise StudyError(f"packing.box: {words.files} has none, give its edge lengths")
-        return read_particles(path, frame=None if words.frames == "last" else words.frames, sample=part_of(words))
+        return read_table(path, frame=None if words.frames == "last" else words.frames, sample=part_of(words))
     spec = words.spec(words.density, radius_growth=find_rule(study.contacts.rule).radii_may_grow)
     return ParticleTable(pack(spec, np.random.default_rng(study.seed)))
 

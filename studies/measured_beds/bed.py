@@ -16,7 +16,7 @@ from etc_engine.materials import gas_state, jump_length, pore_conductivity
 from etc_engine.medium.facets import FacetLinks, facet_links
 from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.rules import overlap_contacts
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 from etc_engine.realization import effective_conductivity
 
 VOXELS = 96
@@ -50,7 +50,7 @@ class Bed:
     """A bed of unit spheres; lengths scale with the diameter."""
 
     def __init__(self, path: Path) -> None:
-        packing = read_particles(path).packing
+        packing = read_table(path).packing
         network = overlap_contacts(packing)
         self.packing = packing
         self.links: FacetLinks = facet_links(network)

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import cg
 from etc_engine.engines.dtem.facet_steady import facet_conductivity, uniform_material
 from etc_engine.medium.facets import facet_links
 from etc_engine.medium.rules import overlap_contacts
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 
 RAYS = 2000
 SEED = 20261
@@ -109,7 +109,7 @@ def _unit(out, rng):  # type: ignore[no-untyped-def]
 
 def by_rays(path: Path, emissivity: float) -> float:
     """k_r/(4 sigma T^3 d), mean over the axes."""
-    packing = read_particles(path).packing
+    packing = read_table(path).packing
     side, radius, n = float(packing.box.lengths[0]), float(packing.radii[0]), packing.count
     centers = np.mod(packing.centers, side)
     cells = int(side // (2.0 * radius))
@@ -137,7 +137,7 @@ def by_rays(path: Path, emissivity: float) -> float:
 
 def by_facets(path: Path, emissivity: float) -> float:
     """The same of facing surfaces alone."""
-    packing = read_particles(path).packing
+    packing = read_table(path).packing
     links = facet_links(overlap_contacts(packing))
     links = replace(links, contacts=np.zeros_like(links.contacts))
     material = uniform_material(links, 1e6, 0.0, radiation=1.0 / (2.0 / emissivity - 1.0))

@@ -13,7 +13,7 @@ import pytest
 
 from etc_engine.box import Box
 from etc_engine.particle_files.csv_files import read_csv
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 
 
 @pytest.fixture
@@ -132,7 +132,7 @@ def test_each_method_meets_count_and_density_without_overlap(pack, tmp_path, arg
     done = pack(*arguments, "--seed", 83, "-o", tmp_path / "a.nc", "--json")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    packing = read_particles(tmp_path / "a.nc").packing
+    packing = read_table(tmp_path / "a.nc").packing
     assert packing.count == count
     assert packing.density == pytest.approx(density, rel=1e-9)
     assert largest_overlap(packing) < 1e-10

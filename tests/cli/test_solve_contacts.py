@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from etc_engine.medium.rules import overlap_contacts
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 
 BOUNDS = "ITEM: BOX BOUNDS ff ff ff\n-1 1.6\n0 1\n0 1\n"
 PARTICLES = (
@@ -22,7 +22,7 @@ PARTICLES = (
 def files(tmp_path):
     """A chain of three spheres, and its contacts with the areas of their lenses and given forces."""
     (tmp_path / "p.dump").write_text(PARTICLES)
-    table = read_particles(tmp_path / "p.dump")
+    table = read_table(tmp_path / "p.dump")
     network = overlap_contacts(table.packing)
     rows = []
     for (i, j), alpha in zip(network.pairs, network.angles[:, 0], strict=True):
@@ -75,7 +75,7 @@ def test_ids_stay_with_the_particles(etc_engine, files):
     with xarray.open_dataset(files / "s.nc") as data:
         assert data["particle"].values.tolist() == [10, 20, 30]
         assert float(data["x"].sel(particle=20)) + data.attrs["origin"][0] == pytest.approx(1.2)
-    again = read_particles(files / "s.nc")
+    again = read_table(files / "s.nc")
     assert again.ids.tolist() == [10, 20, 30]
 
 

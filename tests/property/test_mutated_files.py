@@ -11,7 +11,7 @@ import pytest
 
 from etc_engine.box import Box
 from etc_engine.errors import EtcError
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 from etc_engine.particle_files.precision import doubtful_contacts
 from etc_engine.particle_files.sample import Sample
 
@@ -104,7 +104,7 @@ def read_mutated(folder: Path, count: int, seed: int) -> int:
         whole = Sample(box=((0.0, 1.0), (0.0, 2.0), (-1.0, 1.0)) if boxed else None)
         samples = (whole, replace(whole, crop=((0.0, 0.5), (0.0, 1.0), (-1.0, 1.0))), replace(whole, dimension=3))
         try:
-            table = read_particles(path, sample=samples[int(rng.integers(3))])
+            table = read_table(path, sample=samples[int(rng.integers(3))])
             doubtful_contacts(table)
         except EtcError as error:
             assert str(error).strip()
@@ -134,4 +134,4 @@ def test_three_thousand_mutations(tmp_path):
 def test_the_seeds_themselves_are_good(tmp_path, text):
     (tmp_path / "a").write_text(text)
     box = Box((1.0, 2.0, 1.0)) if not text.startswith(("ITEM", "2")) else None
-    assert read_particles(tmp_path / "a", box).packing.dimension == 3
+    assert read_table(tmp_path / "a", box).packing.dimension == 3

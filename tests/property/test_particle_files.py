@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.errors import EtcError
-from etc_engine.particle_files.formats import CSV, DUMP, format_to_read, read_particles
+from etc_engine.particle_files.formats import CSV, DUMP, format_to_read, read_table
 
 NUMBERS = [
     "0.25",
@@ -68,7 +68,7 @@ def read(data: bytes) -> None:
         if kind not in (CSV, DUMP):
             return
         try:
-            table = read_particles(path, None if kind is DUMP else Box((1.0, 1.0)))
+            table = read_table(path, None if kind is DUMP else Box((1.0, 1.0)))
         except EtcError as error:
             assert str(error)
             return

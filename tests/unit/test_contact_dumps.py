@@ -7,7 +7,7 @@ import pytest
 
 from etc_engine.errors import InputError
 from etc_engine.particle_files.contact_dumps import contact_rows, read_contacts
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 from etc_engine.particle_files.sample import Sample
 
 BOUNDS = "ITEM: BOX BOUNDS pp ff ff\n-1 1\n0 1\n0 1\n"
@@ -40,7 +40,7 @@ def test_columns_without_names_have_the_usual_order(files):
     assert contacts.column("contactArea").tolist() == [0.001, 0.002]
     assert contacts.column("heatFlux").tolist() == [2.5, -1.5]
     assert np.linalg.norm(contacts.column("force"), axis=1).tolist() == [5.0, 2.0]
-    table = read_particles(particles)
+    table = read_table(particles)
     rows = contact_rows(table, contacts)
     assert table.ids[rows].tolist() == [[30, 20], [30, 10]]
     with pytest.raises(InputError, match=r"has no delta: it has pos, force, contactArea, heatFlux"):
@@ -69,7 +69,7 @@ def test_columns_with_names_of_their_own(files):
 
 def test_contacts_of_particles_that_were_cropped_away_are_left_out(files):
     particles, path = files()
-    table = read_particles(particles, sample=Sample(crop=((0.0, 1.0), (0.0, 1.0), (0.0, 1.0))))
+    table = read_table(particles, sample=Sample(crop=((0.0, 1.0), (0.0, 1.0), (0.0, 1.0))))
     rows = contact_rows(table, read_contacts(path))
     assert (rows >= 0).all(axis=1).tolist() == [True, False]
 
@@ -90,4 +90,4 @@ def test_contacts_of_particles_that_were_cropped_away_are_left_out(files):
 def test_contacts_refused_by_name(files, contacts, particles, words):
     first, second = files(contacts, particles)
     with pytest.raises(InputError, match=words):
-        contact_rows(read_particles(first), read_contacts(second))
+        contact_rows(read_table(first), read_contacts(second))

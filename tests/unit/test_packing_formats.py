@@ -15,7 +15,7 @@ from etc_engine.durable import apart
 from etc_engine.errors import EtcError, InputError
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files import netcdf
-from etc_engine.particle_files.formats import format_to_read, format_to_write, read_particles, write_particles
+from etc_engine.particle_files.formats import format_to_read, format_to_write, read_table, write_particles
 from etc_engine.particle_files.table import ParticleTable
 
 ENDINGS = ("csv", "dump", "lammpstrj", "nc", "vtp")
@@ -56,7 +56,7 @@ def test_what_is_written_reads_back_to_the_last_bit(tmp_path, ending, table):
     need(ending)
     path = tmp_path / f"packing.{ending}"
     write_particles(path, table)
-    assert_same(read_particles(path, table.packing.box if ending == "csv" else None), table)
+    assert_same(read_table(path, table.packing.box if ending == "csv" else None), table)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -77,7 +77,7 @@ def test_spheres_at_one_height_stay_spheres(tmp_path):
     flat = ParticleTable(ParticlePacking([[0.5, 0.5, 0.5]], [0.1], Box((1.0, 1.0, 1.0))))
     for ending in ("nc", "csv", "dump"):
         write_particles(tmp_path / f"a.{ending}", flat)
-        assert_same(read_particles(tmp_path / f"a.{ending}", flat.packing.box if ending == "csv" else None), flat)
+        assert_same(read_table(tmp_path / f"a.{ending}", flat.packing.box if ending == "csv" else None), flat)
 
 
 def test_box_and_frame_of_every_format(tmp_path):
@@ -85,10 +85,10 @@ def test_box_and_frame_of_every_format(tmp_path):
     for ending in ("csv", "nc"):
         write_particles(tmp_path / f"a.{ending}", table)
     with pytest.raises(InputError, match="--box is missing: give its edge lengths"):
-        read_particles(tmp_path / "a.csv")
-    assert read_particles(tmp_path / "a.nc", Box((2.0, 3.0))).packing.box == Box((2.0, 3.0))
+        read_table(tmp_path / "a.csv")
+    assert read_table(tmp_path / "a.nc", Box((2.0, 3.0))).packing.box == Box((2.0, 3.0))
     with pytest.raises(InputError, match="netCDF file, which holds one packing: leave the frame out"):
-        read_particles(tmp_path / "a.nc", frame=0)
+        read_table(tmp_path / "a.nc", frame=0)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_netcdf_without_a_packing_is_refused(tmp_path, drop, words):
         del dataset.attrs[drop]
     dataset.to_netcdf(tmp_path / "a.nc", engine="netcdf4")
     with pytest.raises(InputError, match=words):
-        read_particles(tmp_path / "a.nc")
+        read_table(tmp_path / "a.nc")
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_broken_files_are_refused_in_one_line_and_silence(tmp_path, capfd, conte
         need("vtp")
     (tmp_path / "a").write_bytes(content)
     with pytest.raises(EtcError, match="cannot be read as"):
-        read_particles(tmp_path / "a")
+        read_table(tmp_path / "a")
     assert capfd.readouterr().err == ""
 
 
@@ -134,4 +134,4 @@ def test_a_netcdf_packing_that_keeps_the_reader_busy_is_given_up(tmp_path, monke
     monkeypatch.setattr(netcdf, "NETCDF", "while True: pass")
     monkeypatch.setattr(apart, "SECONDS", 0.5)
     with pytest.raises(InputError, match="did not finish"):
-        read_particles(tmp_path / "a.nc")
+        read_table(tmp_path / "a.nc")

@@ -14,7 +14,7 @@ from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.particle_files.dumps import read_dump, read_trajectory
-from etc_engine.particle_files.formats import count_frames, format_to_read, read_particles, write_particles
+from etc_engine.particle_files.formats import count_frames, format_to_read, read_table, write_particles
 from etc_engine.particle_files.sample import Sample
 from etc_engine.particle_files.table import ParticleTable
 
@@ -54,53 +54,53 @@ DUMPS = {
 def test_variants_of_dumps(tmp_path, text):
     path = tmp_path / "a.dump"
     path.write_bytes(text.encode())
-    same(read_particles(path))
+    same(read_table(path))
 
 
 def test_compressed_files(tmp_path):
     data = DUMPS["plain"].encode()
     (tmp_path / "a.gz").write_bytes(gzip.compress(data))
-    same(read_particles(tmp_path / "a.gz"))
+    same(read_table(tmp_path / "a.gz"))
     (tmp_path / "cut.gz").write_bytes(gzip.compress(data)[:-12])
     with pytest.raises(InputError, match="cannot be read"):
-        read_particles(tmp_path / "cut.gz")
+        read_table(tmp_path / "cut.gz")
     zstandard = pytest.importorskip("zstandard", reason="the extra zst is not installed")
     (tmp_path / "a.zst").write_bytes(zstandard.ZstdCompressor().compress(data))
-    same(read_particles(tmp_path / "a.zst"))
+    same(read_table(tmp_path / "a.zst"))
     assert count_frames(tmp_path / "a.zst") == 1
 
 
 def test_standard_input(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(DUMPS["plain"].encode())))
-    same(read_particles("-"))
+    same(read_table("-"))
 
 
 def test_errors_name_standard_input(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"hello\n")))
     with pytest.raises(InputError, match="standard input is not in a known format"):
-        read_particles("-")
+        read_table("-")
 
 
 def test_netcdf_in_single_precision_has_a_step(tmp_path):
     import xarray
 
     write_particles(tmp_path / "a.nc", ParticleTable(ParticlePacking(CENTERS, RADII, BOX)))
-    assert read_particles(tmp_path / "a.nc").printed is None
+    assert read_table(tmp_path / "a.nc").printed is None
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         data.load().astype(np.float32).to_netcdf(tmp_path / "b.nc", engine="netcdf4")
-    printed = read_particles(tmp_path / "b.nc").printed
+    printed = read_table(tmp_path / "b.nc").printed
     assert printed.radius.step(RADII) == pytest.approx(2.0**-23 * RADII)
 
 
 def test_units_become_metres(tmp_path):
     (tmp_path / "a.dump").write_text("ITEM: UNITS\ncgs\n" + DUMPS["plain"])
-    table = read_particles(tmp_path / "a.dump", sample=Sample(crop=((0.0, 1.0), (0.25, 2.0), (0.0, 1.0))))
+    table = read_table(tmp_path / "a.dump", sample=Sample(crop=((0.0, 1.0), (0.25, 2.0), (0.0, 1.0))))
     assert table.packing.box == Box((0.01, 0.0175, 0.01), (True, False, False))
     np.testing.assert_allclose(table.packing.radii, 0.01 * RADII)
     assert "converted to metres" in table.notes[0]
     (tmp_path / "b.dump").write_text("ITEM: UNITS\nfurlong\n" + DUMPS["plain"])
     with pytest.raises(InputError, match="units 'furlong' are unknown"):
-        read_particles(tmp_path / "b.dump")
+        read_table(tmp_path / "b.dump")
 
 
 def test_columns_beside_positions_and_radii(tmp_path):
@@ -109,16 +109,14 @@ def test_columns_beside_positions_and_radii(tmp_path):
         "20 glass 0.75 0.5 0.625 0.125 300.5 2.5\n10 steel 0.25 0.5 0.125 0.25 400.5 16\n"
     )
     with pytest.raises(InputError, match="name the column of radii with --radius-column"):
-        read_particles(tmp_path / "a.dump")
-    table = read_particles(tmp_path / "a.dump", sample=Sample(radius_column="c_rad"))
+        read_table(tmp_path / "a.dump")
+    table = read_table(tmp_path / "a.dump", sample=Sample(radius_column="c_rad"))
     same(table)
     assert table.ids.tolist() == [10, 20]
     assert table.types.tolist() == ["steel", "glass"]
     assert table.temperature.tolist() == [400.5, 300.5]
     assert table.conductivity.tolist() == [16.0, 2.5]
-    kept = read_particles(
-        tmp_path / "a.dump", sample=Sample(radius_column="c_rad", crop=((0.5, 1.0), FACES[1], FACES[2]))
-    )
+    kept = read_table(tmp_path / "a.dump", sample=Sample(radius_column="c_rad", crop=((0.5, 1.0), FACES[1], FACES[2])))
     assert (kept.ids.tolist(), kept.types.tolist(), kept.origin) == ([20], ["glass"], (0.5, 0.0, 0.0))
 
 
@@ -140,7 +138,7 @@ def test_dumps_refused_by_name(tmp_path, old, new, words):
     assert old in text
     (tmp_path / "a.dump").write_text(new.join(text.rsplit(old, 1)))
     with pytest.raises(InputError, match=words):
-        read_particles(tmp_path / "a.dump")
+        read_table(tmp_path / "a.dump")
 
 
 def frames(count: int, rows: int = 2) -> str:
@@ -203,7 +201,7 @@ TABLES = {
 def test_variants_of_tables(tmp_path, text):
     path = tmp_path / "a.txt"
     path.write_bytes(text.encode())
-    same(read_particles(path, BOX))
+    same(read_table(path, BOX))
 
 
 @pytest.mark.parametrize(
@@ -223,15 +221,15 @@ def test_variants_of_tables(tmp_path, text):
 def test_tables_refused_by_name(tmp_path, text, words):
     (tmp_path / "a.txt").write_text(text)
     with pytest.raises(InputError, match=words):
-        read_particles(tmp_path / "a.txt", Box((1.0, 1.0)))
+        read_table(tmp_path / "a.txt", Box((1.0, 1.0)))
 
 
 def test_binary_is_no_format_i_know(tmp_path):
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00")
     with pytest.raises(InputError, match="not in a known format"):
-        read_particles(tmp_path / "a.png")
+        read_table(tmp_path / "a.png")
     with pytest.raises(InputError, match="cannot be read"):
-        read_particles(tmp_path)
+        read_table(tmp_path)
 
 
 XYZ = (
@@ -243,13 +241,13 @@ XYZ = (
 def test_extended_xyz(tmp_path):
     path = tmp_path / "a.xyz"
     path.write_text(XYZ.replace("0.25 0.5 0.125 0.25", "0.25 0.5 0.5 0.25") + XYZ)
-    table = read_particles(path)
+    table = read_table(path)
     same(table)
     assert table.types.tolist() == ["C", "O"]
     assert count_frames(path) == 2
-    assert read_particles(path, frame=0).packing.centers[0, 2] == 0.5
+    assert read_table(path, frame=0).packing.centers[0, 2] == 0.5
     path.write_text(XYZ.replace(' pbc="T F F"', ""))
-    assert read_particles(path).packing.box.periodic == (True,) * 3
+    assert read_table(path).packing.box.periodic == (True,) * 3
     for old, new, words in (
         ("1 0 0 0 2", "1 0.1 0 0 2", "tilted box"),
         (":radius:R:1", ":mass:R:1", "neither a radius"),
@@ -258,19 +256,19 @@ def test_extended_xyz(tmp_path):
     ):
         path.write_text(XYZ.replace(old, new))
         with pytest.raises(InputError, match=words):
-            read_particles(path)
+            read_table(path)
 
 
 def test_mercury(tmp_path):
     path = tmp_path / "a.data"
     rows = "0.25 0.5 0.125 0 0 0 0.25 0 0 0 0 0 0 0\n0.75 0.5 0.625 0 0 0 0.125 0 0 0 0 0 0 1\n"
     path.write_text(f"2 0.5 0 0 0 1 2 1 \n{rows}" * 2)
-    same(read_particles(path, sample=Sample(periodic="x")))
-    table = read_particles(path, frame=0)
+    same(read_table(path, sample=Sample(periodic="x")))
+    table = read_table(path, frame=0)
     assert table.packing.box.periodic == (False,) * 3
     assert "which axes are periodic" in table.notes[0]
     path.write_text("1 0.5 0 0 1 2\n0.25 0.5 0 0 0.25 0 0 0\n")
-    disk = read_particles(path).packing
+    disk = read_table(path).packing
     assert (disk.dimension, disk.centers.tolist(), disk.radii.tolist()) == (2, [[0.25, 0.5]], [0.25])
 
 
@@ -284,18 +282,18 @@ def test_vtk_of_others(tmp_path):
         "SCALARS radius float 1\nLOOKUP_TABLE default\n0.25 0.125\n"
     )
     with pytest.raises(InputError, match="--box is missing"):
-        read_particles(path)
-    table = read_particles(path, BOX)
+        read_table(path)
+    table = read_table(path, BOX)
     same(table)
     assert table.ids.tolist() == [7, 8]
     assert table.printed is not None  # single precision
     foreign = tmp_path / "a.vtp"
     write_particles(foreign, ParticleTable(ParticlePacking(CENTERS, RADII, BOX)))
-    same(read_particles(foreign))
+    same(read_table(foreign))
     foreign.write_bytes(re.sub(b"<FieldData>.*</FieldData>", b"", foreign.read_bytes(), flags=re.DOTALL))
     with pytest.raises(InputError, match="--box is missing"):
-        read_particles(foreign)
-    same(read_particles(foreign, BOX))
+        read_table(foreign)
+    same(read_table(foreign, BOX))
 
 
 def test_every_format_is_told_by_its_content(tmp_path):

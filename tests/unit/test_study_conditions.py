@@ -21,7 +21,7 @@ from etc_engine.medium.rules import RULES, find_rule
 from etc_engine.models import evaluate
 from etc_engine.output.figures import draw_bed, draw_over_temperature
 from etc_engine.packing import pack
-from etc_engine.particle_files.formats import read_particles
+from etc_engine.particle_files.formats import read_table
 from etc_engine.realization.realize import realize
 from etc_engine.service.curve import curve_of
 from etc_engine.study.conditions import derived_conductivities
@@ -346,7 +346,7 @@ def test_a_binary_bed_of_three_materials_in_gas(tmp_path):
     assert study.methods == ("facets",) and list(study.axes) == ["pressure"]
     spec = study.for_realization(study.realization_spec(None), 0)
     found = [float(np.trace(cell.conductivity)) / 3.0 for cell in realize(spec, np.random.default_rng(1)).cells]
-    packing = read_particles(file).packing
+    packing = read_table(file).packing
     assert len(set(packing.radii.tolist())) == 2
     kappa = [float(find_solid(name).conductivity.at(600.0)) for name in ("alumina", "SS316")]
     each = np.array([kappa[0]] * 4 + [kappa[1]] + [5.0] * 3)
