@@ -53,7 +53,8 @@ def test_box_crop_and_periodic_axes_replace_those_of_the_file(tmp_path):
 
 
 def test_the_conductivity_is_a_number_where_one_axis_was_asked_for(disks):
-    medium = Medium(disks, 1.0, bonded_contacts(disks.with_radii(np.full(2, 0.25)), 0.1))
+    touching = disks.with_radii(np.full(2, 0.25))
+    medium = Medium(touching, 1.0, bonded_contacts(touching, 0.1))
     one = effective_conductivity(medium, axes=(0,))
     assert isinstance(one.conductivity, float)
     assert one.conductivity == one.tensor[0, 0]
@@ -64,7 +65,13 @@ def test_the_conductivity_is_a_number_where_one_axis_was_asked_for(disks):
 def test_words_of_results_are_one_short_line(disks):
     medium = Medium(disks, disks.columns["conductivity"], overlap_contacts(disks))
     result = effective_conductivity(medium, axes=(0,))
-    for thing in (disks, medium, medium.network, result, field_along(medium, result)):
+    for thing in (
+        disks,
+        medium,
+        medium.network,
+        result,
+        field_along(medium, result, engine="dtem", method="chord", axis=0),
+    ):
         assert len(repr(thing)) < 160, repr(thing)
         assert "\n" not in repr(thing)
     assert repr(result).startswith(f"<EffectiveConductivity: k along x {result.conductivity:.6g} W/(m K), ")
