@@ -50,6 +50,7 @@ def cases():
     yield "2D long", shaken_lattice(Box((4.0, 1.0), (True, False)), 6, 0.1, 7), "radius"
     yield "2D below percolation", shaken_lattice(Box((1.0, 1.0), (True, True)), 20, 0.6, 5), "overlap"
     yield "3D below percolation", shaken_lattice(Box((1.0, 1.0, 1.0)), 8, 0.85, 5), "overlap"
+    yield "2D row", shaken_lattice(Box((9.0, 1.0)), 1, 0.0, 7), "overlap"
     yield "2D of two columns", shaken_lattice(Box((1.0, 1.0), (True, True)), 2, 0.0, 9), "overlap"
     yield "3D of two layers", shaken_lattice(Box((1.0, 1.0, 1.0), (True, True, True)), 2, 0.0, 9), "bonded"
 

@@ -102,7 +102,7 @@ def make_part(
     """
     centers = box.wrap(centers)
     together(ranks, lambda: _check(box, centers, radii))
-    owner = _owners(centers, _grid(box, ranks.size), ranks)
+    owner = _owners(centers, ranks)
     rows = np.column_stack([centers, radii, conductivity])
     held = np.concatenate(ranks.exchange([rows[owner == rank] for rank in range(ranks.size)]))
     counts = ranks.share(len(held))
@@ -128,12 +128,10 @@ def _check(box: Box, centers: Floats, radii: Floats) -> None:
             )
 
 
-def _grid(box: Box, size: int) -> tuple[int, ...]:
-    """Blocks along each axis, ``size`` in all, of the least surface."""
-    return min(
-        _factors(size, box.dimension),
-        key=lambda shape: sum(n / length for n, length in zip(shape, box.lengths, strict=True)),
-    )
+def _grid(extent: Floats, size: int) -> tuple[int, ...]:
+    """Blocks along each axis, ``size`` in all, of the least surface, for centres of a given extent along each axis."""
+    lengths = np.maximum(extent, 1e-12 * extent.max() or 1.0)
+    return min(_factors(size, lengths.size), key=lambda shape: float((shape / lengths).sum()))
 
 
 def _factors(size: int, axes: int) -> Iterator[tuple[int, ...]]:
@@ -145,13 +143,13 @@ def _factors(size: int, axes: int) -> Iterator[tuple[int, ...]]:
             yield from ((n, *rest) for rest in _factors(size // n, axes - 1))
 
 
-def _owners(centers: Floats, grid: tuple[int, ...], ranks: Ranks) -> Ints:
+def _owners(centers: Floats, ranks: Ranks) -> Ints:
     """Rank of each particle: cuts axis by axis at equal numbers of particles."""
-    owner = np.zeros(len(centers), dtype=np.int64)
+    ends = np.array(ranks.share((centers.min(axis=0, initial=np.inf), centers.max(axis=0, initial=-np.inf))))
+    lows, highs = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+    grid, owner = _grid(highs - lows, ranks.size), np.zeros(len(centers), dtype=np.int64)
     for axis, pieces in enumerate(grid):
-        x = centers[:, axis]
-        ends = np.array(ranks.share((x.min(initial=np.inf), x.max(initial=-np.inf))))
-        low, high = ends[:, 0].min(), ends[:, 1].max()
+        x, low, high = centers[:, axis], lows[axis], highs[axis]
         place = np.minimum(((x - low) * (BINS / max(high - low, 1e-300))).astype(np.int64), BINS - 1)
         blocks = int(np.prod(grid[:axis], dtype=np.int64))
         counts = np.bincount(owner * BINS + place, minlength=blocks * BINS)
