@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.box import Box, ball_measure
@@ -57,11 +59,7 @@ def find_rattlers(packing: ParticlePacking, contacts: NeighborPairs) -> Flags:
     [True, True]
     """
     needed = packing.dimension + 1
-    held_by_walls = np.zeros(packing.count, dtype=np.int64)
-    for axis, length in enumerate(packing.box.lengths):
-        if not packing.box.periodic[axis]:
-            position, reach = packing.centers[:, axis], packing.radii * (1.0 + 1e-6)
-            held_by_walls += (position <= reach).astype(np.int64) + (length - position <= reach)
+    held_by_walls = _wall_contacts(packing)
     kept = np.ones(packing.count, dtype=np.bool_)
     i, j = contacts.pairs.T
     while True:
@@ -71,6 +69,46 @@ def find_rattlers(packing: ParticlePacking, contacts: NeighborPairs) -> Flags:
         if fewer.sum() == kept.sum():
             return ~kept
         kept = fewer
+
+
+def few_contacts(packing: ParticlePacking, contacts: NeighborPairs) -> Flags:
+    """Particles with fewer than d + 1 contacts, walls counted, shape (n,).
+
+    Nothing is removed on the way: a bonded or frictional packing, which `find_rattlers` may take apart altogether,
+    keeps its other particles.
+
+    Examples
+    --------
+    >>> row = [[0.1 + 0.2 * i, 0.1] for i in range(5)]
+    >>> packing = ParticlePacking(row, [0.1] * 5, Box((1.0, 1.0)))
+    >>> few_contacts(packing, neighbor_pairs(packing, relative_gap=1e-9)).tolist()
+    [False, False, False, False, False]
+    """
+    return np.asarray(coordination_numbers(packing, contacts) + _wall_contacts(packing) < packing.dimension + 1)
+
+
+def largest_cluster(packing: ParticlePacking, contacts: NeighborPairs) -> Flags:
+    """Particles of the largest cluster of particles in contact, shape (n,).
+
+    Examples
+    --------
+    >>> packing = ParticlePacking([[0.1, 0.5], [0.3, 0.5], [0.8, 0.5]], [0.1] * 3, Box((1.0, 1.0)))
+    >>> largest_cluster(packing, neighbor_pairs(packing, relative_gap=1e-9)).tolist()
+    [True, True, False]
+    """
+    links = coo_array((np.ones(contacts.count), contacts.pairs.T), shape=(packing.count, packing.count))
+    _, labels = connected_components(links, directed=False)
+    return np.asarray(labels == np.bincount(labels).argmax())
+
+
+def _wall_contacts(packing: ParticlePacking) -> Ints:
+    """Number of walls that each particle touches, shape (n,)."""
+    touched = np.zeros(packing.count, dtype=np.int64)
+    for axis, length in enumerate(packing.box.lengths):
+        if not packing.box.periodic[axis]:
+            position, reach = packing.centers[:, axis], packing.radii * (1.0 + 1e-6)
+            touched += (position <= reach).astype(np.int64) + (length - position <= reach)
+    return touched
 
 
 def contact_directions(packing: ParticlePacking, contacts: NeighborPairs) -> Floats:
@@ -181,12 +219,16 @@ def pair_correlation(packing: ParticlePacking, farthest: float, bins: int = 100)
     return RadialFunction(middles, np.asarray(counts / expected, dtype=np.float64))
 
 
-def two_point_probability(packing: ParticlePacking, farthest: float, pixels: int = 1024) -> RadialFunction:
+def two_point_probability(
+    packing: ParticlePacking, farthest: float, pixels: int = 1024, margin: float = 0.0
+) -> RadialFunction:
     """Probability S2(r) that two points at distance r both lie in the solid.
 
-    S2(0) is the solid fraction and S2 tends to its square. The union of the particles is drawn on a grid
-    whose autocorrelation, by fast Fourier transform, is averaged over all directions; across walls only pairs
-    of points inside the box count.
+    S2(0) is the solid fraction. S2 tends to its square where the medium is homogeneous: in periodic boxes, and between
+    walls at some distance from them (``margin``), since particles stand in layers along a wall.
+
+    The union of the particles is drawn on a grid whose autocorrelation, by fast Fourier transform, is averaged over
+    all directions. Across walls only pairs of points inside the box count.
 
     Parameters
     ----------
@@ -195,6 +237,8 @@ def two_point_probability(packing: ParticlePacking, farthest: float, pixels: int
         Largest distance [m], not above half the shortest edge.
     pixels : int
         Grid points along the longest edge: the value is exact to about a pixel's share of the surface.
+    margin : float
+        Points closer to a wall than this are left out [m].
 
     Returns
     -------
@@ -216,12 +260,12 @@ def two_point_probability(packing: ParticlePacking, farthest: float, pixels: int
     >>> round(float(two_point_probability(packing, 0.1, 256).values[0]), 2)
     0.28
     """
-    box = packing.box
+    step = max(packing.box.lengths) / pixels
+    shape = tuple(max(1, round(length / step)) for length in packing.box.lengths)
+    solid, box = _inside(packing, _draw(packing, shape).astype(np.float64), margin)
     if not 0.0 < farthest <= 0.5 * min(box.lengths):
         raise InputError(f"the farthest distance must lie in (0, half the shortest edge], found {farthest:g}")
-    step = max(box.lengths) / pixels
-    shape = tuple(max(1, round(length / step)) for length in box.lengths)
-    solid = _draw(packing, shape).astype(np.float64)
+    shape = solid.shape
     padded = tuple(n if periodic else 2 * n for n, periodic in zip(shape, box.periodic, strict=True))
     spectrum = np.fft.rfftn(solid, padded, axes=range(len(shape)))
     overlaps = np.fft.irfftn(np.abs(spectrum) ** 2, padded, axes=range(len(shape)))
@@ -236,6 +280,18 @@ def two_point_probability(packing: ParticlePacking, farthest: float, pixels: int
     sums = np.bincount(shell[near], overlaps[near])
     pairs = np.bincount(shell[near], weights[near]) * solid.size
     return RadialFunction(step * np.arange(sums.size, dtype=np.float64), np.asarray(sums / pairs, dtype=np.float64))
+
+
+def _inside(packing: ParticlePacking, solid: Floats, margin: float) -> tuple[Floats, Box]:
+    """The pixels that lie at least a margin from the walls, and the box that they fill."""
+    box, cuts, lengths = packing.box, [], []
+    for n, length, periodic in zip(solid.shape, box.lengths, box.periodic, strict=True):
+        cut = 0 if periodic else int(np.ceil(margin / length * n - 1e-9))
+        if 2 * cut >= n or margin < 0.0:
+            raise InputError(f"a margin of {margin:g} m leaves nothing of the box {box.lengths}")
+        cuts.append(slice(cut, n - cut))
+        lengths.append(length * (n - 2 * cut) / n)
+    return solid[tuple(cuts)], Box(tuple(lengths), box.periodic)
 
 
 def _window(box: Box, distances: Floats) -> Floats:

@@ -31,7 +31,8 @@ def test_a_crystal_of_disks_is_drawn_with_its_known_structure(hexagonal):
     assert s2[0] == pytest.approx(np.pi / np.sqrt(12.0), abs=2e-3)
     words = [text.get_text() for text in drawn[""].texts]
     assert words[words.index("fabric eigenvalues") + 1] == "0.500 0.500"
-    assert words[words.index("rattlers") + 1] == "0.0 %"
+    assert words[words.index("below 3 contacts") + 1] == "0.0 % of the particles"
+    assert words[words.index("largest cluster") + 1] == "100.0 %"
 
 
 def test_overlapping_disks_show_their_half_angles():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from etc_engine.box import Box
 from etc_engine.errors import InputError
-from etc_engine.packing import ParticlePacking, neighbor_pairs
+from etc_engine.packing import PackingSpec, ParticlePacking, neighbor_pairs, pack, parse_radii
 from etc_engine.packing.hard_spheres import make_gas, run, start_lists
 from etc_engine.packing.lubachevsky_stillinger import compress
 from etc_engine.structure.statistics import (
@@ -17,7 +17,9 @@ from etc_engine.structure.statistics import (
     contact_half_angles,
     coordination_numbers,
     fabric_tensor,
+    few_contacts,
     find_rattlers,
+    largest_cluster,
     pair_correlation,
     two_point_probability,
 )
@@ -140,3 +142,27 @@ def test_senseless_requests_are_refused(hexagonal):
         pair_correlation(alone, 0.2)
     with pytest.raises(InputError, match="at least one contact"):
         fabric_tensor(alone, neighbor_pairs(alone))
+
+
+def test_a_connected_packing_of_few_contacts_is_not_all_rattlers():
+    spec = PackingSpec("advancing-front", parse_radii("uniform:0.01:0.02"), Box((1.0, 1.0)))
+    packing = pack(spec, np.random.default_rng(20261))
+    contacts = neighbor_pairs(packing, relative_gap=1e-6)
+    assert largest_cluster(packing, contacts).mean() > 0.95
+    numbers = coordination_numbers(packing, contacts)
+    few = few_contacts(packing, contacts)
+    assert 0.0 < few.mean() < 0.3
+    assert not few[numbers >= 3].any()
+
+
+def test_two_point_probability_off_the_walls_tends_to_the_square():
+    spec = PackingSpec("advancing-front", parse_radii("uniform:0.01:0.02"), Box((1.5, 1.5)))
+    packing = pack(spec, np.random.default_rng(20261))
+    whole = two_point_probability(packing, 0.3, 1200)
+    inside = two_point_probability(packing, 0.3, 1200, margin=0.06)
+    far = inside.distances > 0.2
+    limit, wrong = inside.values[0] ** 2, whole.values[0] ** 2
+    assert abs(inside.values[far].mean() / limit - 1.0) < 0.003
+    assert abs(whole.values[far].mean() / wrong - 1.0) > 0.003  # what the figure drew
+    with pytest.raises(InputError, match="leaves nothing"):
+        two_point_probability(packing, 0.1, 100, margin=0.8)

@@ -20,7 +20,8 @@ from etc_engine.structure.statistics import (
     contact_half_angles,
     coordination_numbers,
     fabric_tensor,
-    find_rattlers,
+    few_contacts,
+    largest_cluster,
     pair_correlation,
     two_point_probability,
 )
@@ -32,6 +33,8 @@ MOST_PAIRS = 4e6
 """Of a large packing the pair correlation is drawn no farther than about this many pairs reach."""
 GRID_POINTS = 4e6
 """Points of the grid on which the two-point probability is found, with the margins that walls need."""
+WALL_LAYERS = 2.0
+"""Mean diameters along each wall that the two-point probability leaves out, where the room allows it."""
 TANGENT = np.radians(0.01)
 """Contacts of a smaller half-angle are points."""
 
@@ -74,7 +77,7 @@ def draw_structure(packing: ParticlePacking, bond_gap: float = 1e-6) -> Figure:
     else:
         _draw_cosines(right.add_subplot(2, 3, 3), packing, contacts)
     _draw_pair_correlation(right.add_subplot(2, 3, 4), packing)
-    _draw_two_point(right.add_subplot(2, 3, 5), packing, solid)
+    _draw_two_point(right.add_subplot(2, 3, 5), packing)
     _write_numbers(right.add_subplot(2, 3, 6), packing, contacts, solid)
     return figure
 
@@ -147,15 +150,22 @@ def _draw_pair_correlation(axes: Axes, packing: ParticlePacking) -> None:
     _label(axes, "distance / mean diameter", "g(r)", "pair correlation of the centres")
 
 
-def _draw_two_point(axes: Axes, packing: ParticlePacking, solid: float) -> None:
-    diameter = 2.0 * float(packing.radii.mean())
-    farthest = min(FARTHEST * diameter, 0.5 * min(packing.box.lengths))
-    s2 = two_point_probability(packing, farthest, _pixels(packing.box))
+def _draw_two_point(axes: Axes, packing: ParticlePacking) -> None:
+    diameter, box = 2.0 * float(packing.radii.mean()), packing.box
+    between = [length for length, periodic in zip(box.lengths, box.periodic, strict=True) if not periodic]
+    margin = WALL_LAYERS * diameter if between else 0.0
+    homogeneous = 2.0 * margin <= 0.5 * min(between, default=box.lengths[0])
+    margin = margin if homogeneous else 0.0
+    edges = [length - (0.0 if flag else 2.0 * margin) for length, flag in zip(box.lengths, box.periodic, strict=True)]
+    s2 = two_point_probability(packing, min(FARTHEST * diameter, 0.45 * min(edges)), _pixels(box), margin)
+    solid = float(s2.values[0])
     axes.plot(s2.distances / diameter, s2.values, color=COLOURS[0], linewidth=1.2)
     axes.plot([0.0], [solid], "o", color=COLOURS[1], markersize=5, clip_on=False, label="solid fraction")
-    axes.axhline(solid**2, color=GREY, linewidth=1.0, linestyle="--", label="its square")
+    if homogeneous:
+        axes.axhline(solid**2, color=GREY, linewidth=1.0, linestyle="--", label="its square")
     axes.legend(fontsize=8, frameon=False)
-    _label(axes, "distance / mean diameter", r"$S_2(r)$", "two-point probability of the solid")
+    where = f", {WALL_LAYERS:g} diameters off walls" if margin else " of the solid"
+    _label(axes, "distance / mean diameter", r"$S_2(r)$", f"two-point probability{where}")
 
 
 def _write_numbers(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs, solid: float) -> None:
@@ -173,8 +183,10 @@ def _write_numbers(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs
         ("coordination", f"{numbers.mean():.4f}"),
     ]
     if contacts.count:
-        rattlers, fabric = find_rattlers(packing, contacts), fabric_tensor(packing, contacts)
-        rows.append(("rattlers", f"{100.0 * rattlers.mean():.1f} %"))
+        few, cluster = few_contacts(packing, contacts), largest_cluster(packing, contacts)
+        fabric = fabric_tensor(packing, contacts)
+        rows.append((f"below {packing.dimension + 1} contacts", f"{100.0 * few.mean():.1f} % of the particles"))
+        rows.append(("largest cluster", f"{100.0 * cluster.mean():.1f} %"))
         rows.append(("fabric diagonal", " ".join(f"{value:.3f}" for value in np.diag(fabric))))
         rows.append(("fabric eigenvalues", " ".join(f"{value:.3f}" for value in np.linalg.eigvalsh(fabric)[::-1])))
     axes.set_axis_off()
