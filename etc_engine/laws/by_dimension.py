@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from etc_engine.arrays import Flags, Floats, Ints
 from etc_engine.errors import InputError
-from etc_engine.laws import disk, sphere, sphere_dents
+from etc_engine.laws import disk, disk_chords, sphere, sphere_dents
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ LAWS: Mapping[int, ResistanceLaw] = {
         "arc",
         disk.SELF_RESISTANCE,
         disk.SELF_RESISTANCE,
-        disk.resistance_matrices,
+        disk_chords.resistance_matrices,
         disk.first_moments,
         disk.segment_area,
         warming=(0.125 - np.log(2.0)) / np.pi,

@@ -23,7 +23,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.special import zeta
 
-from etc_engine.arrays import Flags, Floats, Ints
+from etc_engine.arrays import Floats, Ints
 from etc_engine.errors import InputError
 
 _ZETA_3 = 1.2020569031595942
@@ -252,9 +252,7 @@ def chord_resistance(alpha: ArrayLike) -> Floats:
     Notes
     -----
     The exact resistance, by conformal map, of the disk less the circular segment behind an
-    isothermal chord, for a far source: with the arc-to-source terms of `mutual_resistance` it
-    makes the disk between two opposite chords exact to leading order. It degrades as neighbouring
-    chords approach each other.
+    isothermal chord, for a far source. Mutual resistances: see `etc_engine.laws.disk_chords`.
 
     Examples
     --------
@@ -293,14 +291,8 @@ def self_resistance(alpha: ArrayLike, method: str) -> Floats:
     return SELF_RESISTANCE[method](alpha)
 
 
-def resistance_matrices(
-    offsets: Ints,
-    arms: Floats,
-    alpha: Floats,
-    method: str,
-    cutting: Flags | None = None,  # noqa: ARG001  (the interface of both laws)
-) -> Floats:
-    """Resistance matrices kappa H of many disks, packed row by row one after the other.
+def resistance_matrices(offsets: Ints, arms: Floats, alpha: Floats, method: str) -> Floats:
+    """Resistance matrices kappa H of many disks with uniform flux on their arcs, packed row by row.
 
     Parameters
     ----------
@@ -310,9 +302,7 @@ def resistance_matrices(
         Directions of the contacts from the centre, of any length.
     alpha : ndarray, shape (s,) [rad]
     method : str
-        ``chord``, ``standard`` or ``enhanced``.
-    cutting : ndarray of bool, shape (s,), optional
-        Without effect: mutual resistances of disks do not know the segments cut off.
+        ``standard`` or ``enhanced``.
 
     Returns
     -------
@@ -321,9 +311,10 @@ def resistance_matrices(
 
     Examples
     --------
-    >>> h = resistance_matrices(np.array([0, 2]), np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([0.1, 0.1]), "chord")
+    >>> arms = np.array([[1.0, 0.0], [-1.0, 0.0]])
+    >>> h = resistance_matrices(np.array([0, 2]), arms, np.array([0.1, 0.1]), "standard")
     >>> h.reshape(2, 2).round(4).tolist()
-    [[1.1639, 0.0003], [0.0003, 1.1639]]
+    [[1.2105, 0.0003], [0.0003, 1.2105]]
     """
     theta = np.arctan2(arms[:, 1], arms[:, 0])
     starts = np.concatenate([[0], np.cumsum(np.diff(offsets) ** 2)])

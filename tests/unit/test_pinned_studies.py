@@ -97,4 +97,5 @@ def test_the_first_realization_is_that_of_the_engine_before(name):
 @pytest.mark.parametrize("words", BY_METHOD)
 def test_networks_conduct_as_in_the_engine_before(words):
     study = parse_study(NETWORKS.replace("CONDUCTION", words))
-    assert diagonals(study, 0.7, 1) == pytest.approx(BY_METHOD[words], rel=1e-12)
+    # some disks have a little of the close contacts that chord has learnt since
+    assert diagonals(study, 0.7, 1) == pytest.approx(BY_METHOD[words], rel=1e-6 if "chord" in words else 1e-12)

@@ -10,8 +10,9 @@ temperature along contact i,
     M = -sum_(i /= j) Q_i Q_j (a_i^2 + a_j^2) cot^2(t_ij)/(4 pi kappa)        (moments of the flux),
     J = sum_contacts pi/4 <kappa> (G_A a_A + G_B a_B)^2                       (slopes; <kappa> the harmonic mean),
 
-the relative error of the conductivity is (c_S S + c_M M - c_J J)/E, E the energy. Where all of them vanish, as in
-a straight row, about sin^4(alpha)/500 is left.
+the relative error of the conductivity is (c_S S + c_M M - c_J J)/E, E the energy. A disk of close contacts, of weight w
+(see `etc_engine.laws.disk_chords`), counts in S and M by 1 - w. There .02 w S is left, and c_J is
+1 + .8 alpha + 1.8 alpha^2. Where all terms vanish, as in a straight row, about sin^4(alpha)/500 is left.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from etc_engine.engines.dtem.sphere_error import sphere_error_estimate
 from etc_engine.engines.dtem.steady import SteadySolution
 from etc_engine.engines.dtem.uneven_film import uneven_film
 from etc_engine.errors import InputError
+from etc_engine.laws.disk_chords import closeness
 from etc_engine.medium.sides import ContactSides
 
 COEFFICIENTS = (0.706, -0.070, 1.288)
@@ -34,6 +36,10 @@ COEFFICIENTS = (0.706, -0.070, 1.288)
 ALLOWANCE = 0.25
 """Part of the single terms added to their sum, for what the fit leaves."""
 
+CLOSE = 0.02
+"""Part of S that disks of close contacts leave."""
+CLOSE_SLOPES = (0.8, 1.8)
+"""Rise of their c_J over the half-angle and its square; of random packings at half-angles up to 25 degrees."""
 FILM_ALLOWANCE: Mapping[int, float] = {2: 0.1, 3: 0.25}
 """Part of the excess resistance of a film added for what its law leaves, by the dimension."""
 LEAST = 0.002
@@ -49,32 +55,48 @@ def chord_error_terms(solution: SteadySolution, load: int = 0) -> Floats:
         Of method ``chord``.
     load : int
     """
+    return _all_terms(solution, load)[:3]
+
+
+def _all_terms(solution: SteadySolution, load: int) -> Floats:
+    """S, M, J, and S of close contacts over the energy, shape (4,)."""
     sides, energy = solution.sides, float(solution.energies[load, load])
     if energy == 0.0:
-        return np.zeros(3)
+        return np.zeros(4)
     kappa = solution.medium.conductivity
-    segments, moments, slopes = disk_terms(sides, kappa, solution.heat_flows[:, load])
-    return np.array([segments, moments, _slope_term(sides, kappa, slopes)]) / energy
+    segments, moments, close, slopes = disk_terms(sides, kappa, solution.heat_flows[:, load])
+    return np.array([segments, moments, _slope_term(sides, kappa, slopes), close]) / energy
 
 
-def disk_terms(sides: ContactSides, kappa: Floats, flows: Floats) -> tuple[float, float, Floats]:
-    """S and M of some disks, and the slope G a of each side, shape (s,)."""
-    slopes = np.zeros(sides.nodes.size)
-    segments, moments = _terms(disk_contacts(sides, kappa), np.ascontiguousarray(flows), slopes)
-    return segments, moments, slopes
+def disk_terms(sides: ContactSides, kappa: Floats, flows: Floats) -> tuple[float, float, float, Floats]:
+    """S and M of some disks, S of close contacts, and the slope G a of each side, shape (s,)."""
+    slopes, disks = np.zeros(sides.nodes.size), disk_contacts(sides, kappa)
+    segments, moments, close = _terms(disks, _weights(disks), np.ascontiguousarray(flows), slopes)
+    return segments, moments, close, slopes
 
 
-def least_error(sides: ContactSides, flows: Floats) -> tuple[float, float]:
-    """Sums of sin^4 alpha over the sides with their heat flows, and of these."""
-    size = np.abs(flows)
-    return float((size * np.sin(sides.alpha) ** 4).sum()), float(size.sum())
+def _weights(disks: DiskContacts) -> Floats:
+    """Weight of close contacts of every disk."""
+    return closeness(disks.offsets, disks.theta, disks.alpha, np.ones(disks.alpha.size, dtype=np.bool_))
 
 
-def disk_estimate(terms: Floats, weighted: float, total: float) -> float:
-    """The estimate of `chord_error_estimate` for disks, from S, M, J over the energy and the sums of `least_error`."""
-    parts = np.multiply(COEFFICIENTS, terms) * [1.0, 1.0, -1.0]
-    rest = LEAST * weighted / max(total, np.finfo(float).tiny)
-    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + rest)
+def flow_sums(sides: ContactSides, kappa: Floats, flows: Floats) -> Floats:
+    """Sums over the sides with their heat flows, of sin^4 alpha, of c_J over that of contacts apart, and of these.
+
+    Shape (3,).
+    """
+    disks, size = disk_contacts(sides, kappa), np.abs(flows)
+    weight, alpha = _weights(disks)[sides.particles], sides.alpha
+    rise = (1.0 + alpha * (CLOSE_SLOPES[0] + CLOSE_SLOPES[1] * alpha)) / COEFFICIENTS[2]
+    rise = 1.0 - weight + weight * rise
+    return np.array([(size * np.sin(alpha) ** 4).sum(), (size * rise).sum(), size.sum()])
+
+
+def disk_estimate(terms: Floats, sums: Floats) -> float:
+    """The estimate for disks, from S, M, J and S of close contacts over the energy and the sums of `flow_sums`."""
+    least, rise = np.asarray(sums[:2]) / max(float(sums[2]), np.finfo(float).tiny)
+    parts = np.multiply(COEFFICIENTS, terms[:3]) * [1.0, 1.0, -rise]
+    return float(abs(parts.sum()) + ALLOWANCE * np.abs(parts).sum() + CLOSE * terms[3] + LEAST * least)
 
 
 def _slope_term(sides: ContactSides, kappa: Floats, slopes: Floats) -> float:
@@ -91,7 +113,7 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     """Estimated relative error of the conductivity by method ``chord``, in magnitude.
 
     |s + m - j| + (|s| + |m| + |j|)/4 + <sin^4 alpha>/500 with s = c_S S/E, m = c_M M/E, j = c_J J/E, and what a
-    resistance of contacts leaves (`film_error`).
+    resistance of contacts leaves (`film_error`); and .02 S/E of disks of close contacts.
 
     Parameters
     ----------
@@ -132,8 +154,8 @@ def chord_error_estimate(solution: SteadySolution, load: int = 0) -> float:
     if solution.sides.dimension == 3:
         kappa, energy = solution.medium.conductivity, float(solution.energies[load, load])
         return film + sphere_error_estimate(solution.sides, kappa, solution.heat_flows[:, load], energy)
-    sums = least_error(solution.sides, solution.heat_flows[:, load])
-    return disk_estimate(chord_error_terms(solution, load), *sums) + film
+    sums = flow_sums(solution.sides, solution.medium.conductivity, solution.heat_flows[:, load])
+    return disk_estimate(_all_terms(solution, load), sums) + film
 
 
 def film_error(solution: SteadySolution, load: int = 0) -> float:
@@ -162,9 +184,9 @@ def film_energy(sides: ContactSides, kappa: Floats, flows: Floats) -> float:
 
 
 @njit(cache=True)
-def _terms(disks: DiskContacts, flows: Floats, slopes: Floats) -> tuple[float, float]:
-    """S and M; the slopes G a of all sides into ``slopes``."""
-    segments, moments = 0.0, 0.0
+def _terms(disks: DiskContacts, weights: Floats, flows: Floats, slopes: Floats) -> tuple[float, float, float]:
+    """S and M, and S of close contacts; the slopes G a of all sides into ``slopes``."""
+    segments, moments, close = 0.0, 0.0, 0.0
     theta, alpha, kappa = disks.theta, disks.alpha, disks.conductivity
     for p in range(disks.offsets.size - 1):
         for i in range(disks.offsets[p], disks.offsets[p + 1]):
@@ -174,8 +196,10 @@ def _terms(disks: DiskContacts, flows: Floats, slopes: Floats) -> tuple[float, f
                     cot = 1.0 / np.tan(0.5 * (theta[i] - theta[j]))
                     squares = np.sin(alpha[i]) ** 2 + np.sin(alpha[j]) ** 2
                     slope += 0.5 * flows[j] * cot
-                    moments -= flows[i] * flows[j] * squares * cot * cot / (4.0 * np.pi * kappa[p])
+                    moments -= (1.0 - weights[p]) * flows[i] * flows[j] * squares * cot**2 / (4.0 * np.pi * kappa[p])
             slopes[i] = slope * np.sin(alpha[i]) / (np.pi * kappa[p])
             a = np.sin(alpha[i])
-            segments += kappa[p] * slopes[i] ** 2 * a * (1.0 + 7.0 * a**4)
-    return segments, moments
+            own = kappa[p] * slopes[i] ** 2 * a * (1.0 + 7.0 * a**4)
+            segments += (1.0 - weights[p]) * own
+            close += weights[p] * own
+    return segments, moments, close

@@ -10,7 +10,7 @@ import numpy as np
 
 from etc_engine.arrays import Floats
 from etc_engine.engines.dtem.distributed.nodes import Nodes
-from etc_engine.engines.dtem.model_error import disk_estimate, disk_terms, film_energy, least_error
+from etc_engine.engines.dtem.model_error import disk_estimate, disk_terms, film_energy, flow_sums
 from etc_engine.engines.dtem.sphere_error import sphere_estimate, sphere_slopes
 from etc_engine.medium.backbone import Backbone
 from etc_engine.medium.sides import ContactSides, contact_sides
@@ -45,12 +45,12 @@ def distributed_error(
     padded = np.concatenate([flows, np.zeros(every.nodes.size - flows.size)])
     film = float(ranks.add_up(np.array([film_energy(every, nodes.part.conductivity, padded)]))[0]) / energy
     if sides.dimension == 2:
-        segments, moments, slopes = disk_terms(sides, kappa, flows)
+        segments, moments, close, slopes = disk_terms(sides, kappa, flows)
         inner, at_walls = _at_contacts(nodes, sides, own, slopes[:, None], ranks)
-        weighted, total = least_error(sides, flows)
-        sums = np.asarray(ranks.add_up(np.array([segments, moments, inner, at_walls, weighted, total])))
-        terms = np.array([sums[0], sums[1], 0.5 * np.pi * (sums[2] + sums[3])]) / energy
-        return disk_estimate(terms, float(sums[4]), float(sums[5])) + film
+        local = np.array([segments, moments, inner, at_walls, close, *flow_sums(sides, kappa, flows)])
+        sums = np.asarray(ranks.add_up(local))
+        terms = np.array([sums[0], sums[1], 0.5 * np.pi * (sums[2] + sums[3]), sums[4]]) / energy
+        return disk_estimate(terms, sums[5:]) + film
     powers, vectors = sphere_slopes(sides, kappa, flows)
     inner, at_walls = _at_contacts(nodes, sides, own, vectors, ranks)
     sums = np.asarray(ranks.add_up(np.array([inner, at_walls, powers, float(np.abs(flows).sum())])))
