@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +19,15 @@ from etc_engine.cli.particle_options import (
     warn,
 )
 from etc_engine.cli.physics_options import physics_options
-from etc_engine.cli.solve_notes import trim_cropped_walls, warn_of_missing_contacts
+from etc_engine.cli.solve_notes import trim_cropped_walls, warn_of_gap, warn_of_missing_contacts
 from etc_engine.cli.solve_outputs import SolveOutputs, print_table, write_outputs
 from etc_engine.cli.solve_request import BOND_GAP, SolveRequest, load_axes
 
 if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.medium import Medium
+    from etc_engine.particle_files.table import ParticleTable
+    from etc_engine.realization import Engine
 
 
 @click.command("solve")
@@ -140,6 +144,9 @@ def solve_command(
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
     warn(box_warnings(table, driven, gap))
     warn(excess_warnings(result.tensor, medium.conductivity, medium.pores, result.model_error))
+    if dumped.contacts is None:
+        other = partial(_with_gap, asked, table, particles, engine, method, axes[:1])
+        warn_of_gap(asked, medium, float(result.tensor[axes[0], axes[0]]), other)
     if field is not None:
         write_outputs(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
@@ -149,6 +156,20 @@ def solve_command(
         print_json(record)
     else:
         print_table(record)
+
+
+def _with_gap(
+    asked: SolveRequest,
+    table: ParticleTable,
+    particles: Path,
+    engine: Engine,
+    method: str,
+    axes: tuple[int, ...],
+    gap: float,
+) -> float:
+    """The conductivity along an axis with another bond gap [W/(m K)]."""
+    medium = replace(asked, bond_gap=gap).medium(table, particles, None)
+    return float(asked.solve(medium, engine, method, axes).tensor[axes[0], axes[0]])
 
 
 def _record(

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import click
 
 from etc_engine.cli.solve_request import SolveRequest
+
+NEAR_GAP = 0.02
+"""Part of the pairs near the gap, and change of the conductivity, from which on the gap is questioned."""
+RESOLVED = 20_000
+"""Particles up to which the conductivity is computed again with other gaps."""
 
 if TYPE_CHECKING:
     from etc_engine.medium.medium import Medium
@@ -63,3 +69,32 @@ def warn_of_missing_contacts(network: ContactNetwork, asked: SolveRequest, *, gi
         f"apart: {remedy}",
         err=True,
     )
+
+
+def warn_of_gap(asked: SolveRequest, medium: Medium, k: float, again: Callable[[float], float]) -> None:
+    """How the conductivity changes with half and twice the bond gap, where many pairs lie between the two.
+
+    Parameters
+    ----------
+    asked : SolveRequest
+    medium : Medium
+    k : float
+        Conductivity at the gap asked for [W/(m K)].
+    again : callable
+        (gap in mean radii) -> conductivity [W/(m K)].
+    """
+    from etc_engine.packing.neighbors import neighbor_pairs
+
+    gap, packing = asked.bond_gap, medium.packing
+    if not asked.takes_gap or gap <= 0.0 or medium.pores.conduct or packing.count > RESOLVED or k <= 0.0:
+        return
+    fewer, more = (neighbor_pairs(packing, relative_gap=factor * gap).count for factor in (0.5, 2.0))
+    if more - fewer <= NEAR_GAP * max(medium.links.count, 1):
+        return
+    low, high = again(0.5 * gap), again(2.0 * gap)
+    if max(abs(low - k), abs(high - k)) > NEAR_GAP * k:
+        click.echo(
+            f"etc-engine: warning: {more - fewer} pairs have gaps near --bond-gap {gap:g}: the conductivity is "
+            f"{low:.4g} with half the gap, {k:.4g} as asked, {high:.4g} with twice the gap",
+            err=True,
+        )

@@ -197,7 +197,8 @@ def _lines(path: Path, stream: Iterable[bytes]) -> Iterator[str]:
             text = (line.removeprefix(BOM) if first else line).decode("utf-8")
         except UnicodeDecodeError as error:
             raise InputError(
-                f"{path} is not in a known format, and cannot be read as text: {error.reason} in {line[:40]!r}"
+                f"{path} is not in a known format: it is binary, or text in another encoding than UTF-8 "
+                f"({error.reason})"
             ) from None
         if "\x00" in text:
             raise InputError(f"{path} is not a table of text: it holds zero bytes")

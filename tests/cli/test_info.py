@@ -89,3 +89,12 @@ def test_what_is_of_no_kind_is_refused(etc_engine, tmp_path):
     done = etc_engine("info", tmp_path / "a.txt")
     assert (done.returncode, "not in a known format" in done.stderr) == (2, True)
     assert "no file of that name" in etc_engine("info", tmp_path / "none").stderr
+
+
+def test_a_picture_is_named_binary_without_its_bytes(etc_engine, tmp_path):
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
+    done = etc_engine("info", tmp_path / "a.png")
+    assert done.returncode == 2
+    assert "not in a known format: it is binary" in done.stderr
+    assert done.stderr.rstrip("\n").isprintable()
+    assert "x89" not in done.stderr

@@ -88,3 +88,17 @@ def test_the_record_is_short_and_in_words(etc_engine, files):
     lines = etc_engine("solve", files / "p.dump", "--axis", "y").stdout.splitlines()
     assert any(line.split() == ["status", "not_percolating"] for line in lines)
     assert "homogenize FILE --engine voxel" in etc_engine("solve", files / "p.dump", "--engine", "voxel").stderr
+
+
+def test_a_conductivity_that_depends_on_the_bond_gap_says_so(etc_engine, tmp_path):
+    """A square lattice of disks with gaps from 0 to 0.02 mean radii."""
+    radii = iter(0.05 * (1.0 - 0.01 * np.random.default_rng(20261).random(100)))
+    rows = [f"{0.05 + 0.1 * i},{0.05 + 0.1 * j},{next(radii):.17g}" for i in range(10) for j in range(10)]
+    (tmp_path / "p.csv").write_text("\n".join(["x,y,radius", *rows]))
+    ask = ("solve", tmp_path / "p.csv", "--box", "1,1", "--contact-angle", 5, "--json", "--bond-gap")
+    near, far = etc_engine(*ask, 0.012), etc_engine(*ask, 0.1)
+    assert "pairs have gaps near --bond-gap 0.012: the conductivity is " in near.stderr
+    half, asked, twice = (json.loads(etc_engine(*ask, gap).stdout)["conductivity"] for gap in (0.006, 0.012, 0.024))
+    assert half < asked < twice
+    assert f"{half:.4g} with half the gap, {asked:.4g} as asked, {twice:.4g} with twice the gap" in near.stderr
+    assert "with half the gap" not in far.stderr
