@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from etc_engine.medium.conductivity import EffectiveConductivity
     from etc_engine.medium.medium import Medium
     from etc_engine.particle_files.table import ParticleTable
-    from etc_engine.realization import Engine
 
 
 @click.command("solve")
@@ -145,8 +144,9 @@ def solve_command(
     warn(box_warnings(table, driven, gap))
     warn(excess_warnings(result.tensor, medium.conductivity, medium.pores, result.model_error))
     if dumped.contacts is None:
-        other = partial(_with_gap, asked, table, particles, engine, method, axes[:1])
-        warn_of_gap(asked, medium, float(result.tensor[axes[0], axes[0]]), other)
+        warn_of_gap(
+            asked, medium, record["conductivity"], partial(_with_gap, asked, table, particles, method, axes[:1])
+        )
     if field is not None:
         write_outputs(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
@@ -162,14 +162,15 @@ def _with_gap(
     asked: SolveRequest,
     table: ParticleTable,
     particles: Path,
-    engine: Engine,
     method: str,
     axes: tuple[int, ...],
     gap: float,
 ) -> float:
     """The conductivity along an axis with another bond gap [W/(m K)]."""
+    from etc_engine.realization import find_engine
+
     medium = replace(asked, bond_gap=gap).medium(table, particles, None)
-    return float(asked.solve(medium, engine, method, axes).tensor[axes[0], axes[0]])
+    return float(asked.solve(medium, find_engine(asked.engine), method, axes).tensor[axes[0], axes[0]])
 
 
 def _record(

@@ -112,7 +112,7 @@ def test_files_that_are_not_there_or_not_tables_are_refused(etc_engine, disks, t
     assert "cannot be read" in refused(etc_engine("solve", tmp_path, "--box", "1,1"))
     binary = tmp_path / "binary.csv"
     binary.write_bytes(b"\xff\xfe\x00\x01")
-    assert "cannot be read" in refused(etc_engine("solve", binary, "--box", "1,1"))
+    assert "it is binary" in refused(etc_engine("solve", binary, "--box", "1,1"))
 
 
 def test_impossible_geometries_are_refused(etc_engine, disks):
