@@ -97,7 +97,7 @@ def test_contacts_asked_for_and_not_found_are_told_in_a_gas_too(tmp_path, capfd)
     assert "no surfaces are within 1e-06 mean radii, so heat crosses the pores alone" in done.err
     assert run(words) == 0
     assert "no surfaces" not in capfd.readouterr().err
-    assert "rays past neighbours are left out" in " ".join(help_of(capfd).split())
+    assert "Rays past neighbours are left out" in " ".join(help_of(capfd).split())
 
 
 def help_of(capfd):
