@@ -15,22 +15,25 @@ BAR_DELAY = 1.0
 
 
 class Progress:
-    """Shows units done of units planned, rate, remaining time and failures on stderr."""
+    """Shows units done of units planned, rate, remaining time and failures on stderr.
+
+    The rate counts from the first unit of this run: kernels are compiled before it, which no other unit waits for.
+    """
 
     def __init__(self) -> None:
         self._bar: Any = None
-        self._started = self._told = time.monotonic()
+        self._counted = self._told = time.monotonic()
         self._first: int | None = None
 
     def report(self, done: int, planned: int, failed: int) -> None:
         """Take in the present state; shows it if it is time."""
         if self._first is None:
-            self._first = done
+            self._first, self._counted = done, time.monotonic()
         if sys.stderr.isatty():
             self._show_bar(done, planned, failed)
         elif time.monotonic() - self._told >= LINE_SECONDS:
             self._told = time.monotonic()
-            click.echo(progress_line(done, planned, failed, done - self._first, self._told - self._started), err=True)
+            click.echo(progress_line(done, planned, failed, done - self._first, self._told - self._counted), err=True)
 
     def notify(self, text: str) -> None:
         """A remark of its own line."""

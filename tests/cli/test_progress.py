@@ -27,6 +27,18 @@ def test_a_log_gets_one_line_for_each_period(capsys, monkeypatch):
     assert re.fullmatch(r"etc-engine: 2\d/120 units, 0\.0\d+ units/s, \d+ s to go, failed cells: 2", lines[0]), lines[0]
 
 
+def test_the_compilation_before_the_first_unit_is_no_part_of_the_rate(capsys, monkeypatch):
+    """55 s of compilation, then a unit a second: 30 units are left after 70 s."""
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    with Progress() as shown:
+        for done in range(1, 16):
+            now[0] = 55.0 + done
+            shown.report(done, 45, 0)
+    first = capsys.readouterr().err.splitlines()[0]
+    assert first == "etc-engine: 5/45 units, 1 units/s, 40 s to go, failed cells: 0"
+
+
 def test_units_of_an_earlier_run_do_not_count_for_the_rate():
     assert "0.1 units/s, 100 s to go" in progress_line(90, 100, 0, 10, 100.0)
     assert "no estimate yet" in progress_line(90, 100, 0, 0, 0.0)
