@@ -28,7 +28,7 @@ def test_a_log_gets_one_line_for_each_period(capsys, monkeypatch):
 
 
 def test_the_compilation_before_the_first_unit_is_no_part_of_the_rate(capsys, monkeypatch):
-    """55 s of compilation, then a unit a second: 30 units are left after 70 s."""
+    """55 s of compilation, then a unit a second: 40 units are left after a minute."""
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
     with Progress() as shown:
