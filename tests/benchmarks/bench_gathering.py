@@ -46,7 +46,7 @@ realizations = {units}
 def write_shard(path: Path, units: int) -> None:
     """A shard of finished units, alike but for their realization."""
     tensor = np.array([[0.3123456789, np.nan], [np.nan, 0.3234567891]])
-    cell = Outcome(Status.OK, "", tensor, 1700, 60, 3.5, 900, 9, 1e-11, 0.01, 0.4, "full")
+    cell = Outcome(Status.OK, "", tensor, 1700, 60, 3.5, 900, 9, 1e-11, 0.01, 0.4, solved_by="full")
     record = Record(Unit(0.7, 0), Realization(977, 0.7, 0.69, 0.25, (cell,)), 3, "node0017", 1.5e9, 1.5e9)
     with path.open("wb") as shard:
         for realization in range(units):
