@@ -11,10 +11,11 @@ from scipy.linalg import eigh
 from etc_engine.box import Box
 from etc_engine.engines.dtem import angle_curve
 from etc_engine.engines.dtem.angle_curve import solve_angle_curve
-from etc_engine.engines.dtem.conductivity import conductivity_curve, element_conductivity
+from etc_engine.engines.dtem.conductivity import conductivity_curve, element_conductivity, solve_series
 from etc_engine.engines.dtem.element import smallest_ratio
 from etc_engine.engines.dtem.methods import find_method
 from etc_engine.engines.dtem.steady import solve_steady
+from etc_engine.medium.conduction import Conduction
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import bonded_contacts
 from etc_engine.medium.sides import contact_sides
@@ -187,3 +188,11 @@ for index, solution in solve_angle_curve(medium_of(network), (0,), [0.02, 0.05, 
         answers.append(done.stdout)
     assert answers[0] == answers[1]
     assert len(answers[0].splitlines()) == 5
+
+
+def test_a_series_along_one_axis_is_that_of_each_medium_alone(walled):
+    media = [medium_of(walled.with_half_angle(angle), conductivity=1.0) for angle in (0.05, 0.08, 0.1, 0.12)]
+    found = solve_series(media, Conduction("dtem", "chord", axes=(1,)))
+    for medium, result in zip(media, found, strict=True):
+        alone = element_conductivity(medium, method="chord", axes=(1,))
+        assert result.tensor[1, 1] == pytest.approx(alone.tensor[1, 1], rel=1e-8)

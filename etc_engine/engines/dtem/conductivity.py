@@ -262,7 +262,8 @@ def solve_series(media: Sequence[Medium], conduction: Conduction) -> list[Result
         )
 
     found: dict[int, Result] = {}
-    if conduction.method != "exact" and conduction.options.get("angle_curve", "reduced") == "reduced":
+    reduced = conduction.options.get("angle_curve", "reduced") == "reduced"
+    if reduced and conduction.method != "exact" and conduction.axes is None:
         for rows in _curves(media):
             points = conductivity_curve(
                 media[rows[0]],
