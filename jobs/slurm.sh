@@ -20,9 +20,11 @@ output=${2:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
 restart=${SLURM_RESTART_COUNT:-0}
 read -r -a launcher <<<"${ETC_LAUNCHER:-srun --kill-on-bad-exit=1}"
 part=()
+folder=$output.shards
 if [ -n "${SLURM_ARRAY_TASK_COUNT:-}" ]; then
     number=$(((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN) / ${SLURM_ARRAY_TASK_STEP:-1} + 1))
     part=(--part "$number/$SLURM_ARRAY_TASK_COUNT")
+    folder=$output.part-$number-of-$SLURM_ARRAY_TASK_COUNT.shards
 fi
 
 # Killed ranks leave shared memory that is named after job and step, and MPI_Init of the same step then fails on that
@@ -31,15 +33,22 @@ for ((step = 0; step < restart; step++)); do
     srun --nodes=1 --ntasks=1 true
 done
 
+runs() { find "$folder" -name '*.run' 2>/dev/null | wc -l; }
+before=$(runs)
+
 "${launcher[@]}" etc-engine sweep "$study" -o "$output" --resume "${part[@]}"
 status=$?
 
 case $status in
 75) why="stopped early" ;;
-9 | 15 | 12[89] | 1[3-9][0-9]) why="ranks were killed (status $status)" ;; # 128 + signal; mpiexec gives the signal alone
+9 | 15 | 12[89] | 1[3-9][0-9]) why="ranks were killed (status $status)" ;; # 128 + signal; mpiexec: the signal alone
 *) exit "$status" ;;
 esac
-if [ "$restart" -lt "${ETC_MAX_RESTARTS:-50}" ]; then
+most=${ETC_MAX_RESTARTS:-50}
+if [ "$status" -ne 75 ] && [ "$(runs)" -eq "$before" ] && [ "$most" -gt 5 ]; then
+    most=5 # they did not come as far as beginning: MPI cannot start, say
+fi
+if [ "$restart" -lt "$most" ]; then
     echo "$why: queueing job $SLURM_JOB_ID again"
     scontrol requeue "$SLURM_JOB_ID" && exit 0
 fi

@@ -20,10 +20,25 @@ from etc_engine.service.settings import Settings
 from etc_engine.service.store import Store
 
 SLURM = ("sbatch", "squeue", "scancel")
+UNREACHABLE = (
+    "unable to contact",
+    "not responding",
+    "timed out",
+    "zero bytes were transmitted",
+    "connection refused",
+    "connect failure",
+    "authentication error",
+    "temporarily unable",
+)
+"""What commands of Slurm say when the controller, or munge, is down for a while."""
 RANKS_PER_CORE = 16
 """More ranks than this are a mistake: one per core is fastest."""
 HELD = 'ulimit -d "$1" 2>/dev/null; shift; exec "$@"'
 """Holds the memory of what follows (in kilobytes) and becomes it."""
+
+
+class UnreachableError(OutputError):
+    """The place where batches run does not reply; it may later."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +61,24 @@ class Launcher(Protocol):
         """Seconds between two looks at a batch."""
 
     def start(self, study: str) -> str:
-        """Start the batch of a study; returns how it is found again."""
+        """Start the batch of a study, unless one runs that could not be noted; returns how it is found again.
+
+        Raises
+        ------
+        UnreachableError
+            If the place does not reply, so that nothing is known of the study.
+        OutputError
+            If it refuses the batch.
+        """
 
     def find(self, study: str) -> str:
-        """A batch that was started by a service which could not note it any more; empty if there is none."""
+        """A batch that was started and could not be noted; empty if there is none.
+
+        Raises
+        ------
+        UnreachableError
+            If the place does not reply.
+        """
 
     def look(self, study: str, batch: str) -> Ended | None:
         """None while the batch runs or waits for its machines."""
@@ -142,40 +171,79 @@ class SlurmLauncher:
         return self.settings.squeue_seconds
 
     def start(self, study: str) -> str:
-        """Write the script beside the study and submit it; returns the number of the job."""
+        """Write the script beside the study and submit it; returns the number of the job.
+
+        A job that was submitted earlier without the service noting its number is found by its name.
+        """
+        known = self.find(study)
+        if known:
+            return known
         folder = self.store.folder(study)
         shutil.copyfile(slurm_script(), folder / "slurm.sh")
         options = [f"--ntasks={self.settings.ranks}", f"--job-name={_job_name(study)}", f"--chdir={folder}"]
         options += [f"--output={self.store.log(study)}", *self.settings.sbatch]
         line = ["sbatch", "--parsable", *options, str(folder / "slurm.sh")]
         line += [str(self.store.study_file(study)), str(self.store.result(study))]
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
-        printed = _ask(line, {**batch_environment(), "PATH": path, "ETC_MAX_RESTARTS": "0"})
-        return printed.strip().splitlines()[-1].partition(";")[0]
+        return self._ask(line).strip().splitlines()[-1].partition(";")[0]
 
     def find(self, study: str) -> str:
-        """A job of that name."""
-        printed = _ask(["squeue", "--noheader", f"--name={_job_name(study)}", "--format=%i"])
-        return printed.split()[0] if printed.split() else ""
+        """The number of a job of that name, of this user and in that folder."""
+        line = ["squeue", "--noheader", f"--user={os.getuid()}", f"--name={_job_name(study)}", "--format=%i %Z"]
+        for number, _, place in (row.strip().partition(" ") for row in self._ask(line).splitlines()):
+            if place == str(self.store.folder(study)):
+                return number
+        return ""
 
     def look(self, study: str, batch: str) -> Ended | None:  # noqa: ARG002 - the protocol's signature
         """Slurm forgets a job some minutes after its end, and then calls its number invalid."""
         if not batch:
             return Ended()
-        line = ["squeue", "--noheader", f"--jobs={batch}", "--format=%T"]
-        done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
-        if done.returncode and "invalid job id" not in done.stderr.lower():
-            return None  # the controller does not answer: look again later
-        return None if done.stdout.strip() else Ended()
+        try:
+            found = self._ask(["squeue", "--noheader", f"--jobs={batch}", "--format=%T"])
+        except UnreachableError:
+            return None
+        except OutputError as error:
+            return Ended() if "invalid job id" in str(error).lower() else None
+        return None if found.strip() else Ended()
 
     def stop(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature
         """``scancel``: SIGTERM now, SIGKILL after the site's KillWait."""
-        subprocess.run(["scancel", batch], capture_output=True, check=False, timeout=60)
-
-    def kill(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature
-        """``scancel`` again, with SIGKILL."""
         if batch:
-            subprocess.run(["scancel", "--signal=KILL", batch], capture_output=True, check=False, timeout=60)
+            with suppress(OutputError):
+                self._ask(["scancel", batch])
+
+    def kill(self, study: str, batch: str) -> None:
+        """``scancel`` again, in case it was not heard, and with SIGKILL to the script and all ranks."""
+        self.stop(study, batch)
+        if batch:
+            with suppress(OutputError):
+                self._ask(["scancel", "--full", "--signal=KILL", batch])
+
+    def _ask(self, line: Sequence[str]) -> str:
+        """What a command of Slurm prints.
+
+        Raises
+        ------
+        UnreachableError
+            If the controller does not reply in time, or the command says that it cannot reach it.
+        OutputError
+            If it cannot be run or refuses.
+        """
+        seconds = self.settings.slurm_seconds
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+        environment = {**batch_environment(), "PATH": path, "ETC_MAX_RESTARTS": "0"}
+        try:
+            done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=seconds, env=environment)
+        except subprocess.TimeoutExpired:
+            raise UnreachableError(f"{line[0]} has not replied for {seconds:g} s: trying again") from None
+        except OSError as error:
+            raise OutputError(f"{line[0]} cannot be run: {error}") from None
+        if not done.returncode:
+            return done.stdout
+        reason = " ".join(done.stderr.split()) or f"status {done.returncode}"
+        if any(words in reason.lower() for words in UNREACHABLE):
+            raise UnreachableError(f"{reason}: trying again")
+        raise OutputError(f"{line[0]} refuses: {reason}")
 
 
 def check_launcher(settings: Settings) -> None:
@@ -227,21 +295,3 @@ def _identity(batch: str) -> ProcessIdentity:
 def batch_environment() -> dict[str, str]:
     """The environment for batches, which have no use for the token."""
     return {key: value for key, value in os.environ.items() if key != "ETC_ENGINE_TOKEN"}
-
-
-def _ask(line: Sequence[str], environment: dict[str, str] | None = None) -> str:
-    """What a command of Slurm prints.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be run or refuses.
-    """
-    try:
-        done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60, env=environment)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise OutputError(f"{line[0]} cannot be run: {error}") from None
-    if done.returncode:
-        reason = " ".join(done.stderr.split()) or f"status {done.returncode}"
-        raise OutputError(f"{line[0]} refuses: {reason}")
-    return done.stdout

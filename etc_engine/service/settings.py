@@ -78,7 +78,9 @@ class Settings:
     sbatch : tuple of str
         Further options of ``sbatch``.
     squeue_seconds : float
-        How often Slurm is asked for the state of a job.
+        How often Slurm is asked for the state of a job, and tried again while its controller does not reply.
+    slurm_seconds : float
+        How long a command of Slurm may take until the controller counts as not replying.
     limits : Limits
     engine : tuple of str
         The command that is followed by ``sweep``, ``solve`` or ``report``.
@@ -93,5 +95,6 @@ class Settings:
     hosts: tuple[str, ...] = ()
     sbatch: tuple[str, ...] = ()
     squeue_seconds: float = 5.0
+    slurm_seconds: float = 60.0
     limits: Limits = field(default_factory=Limits)
     engine: tuple[str, ...] = ENGINE

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from etc_engine.durable.provenance import now
 from etc_engine.errors import EtcError, OutputError
 from etc_engine.service.held import REFUSED, EngineError, last_line
-from etc_engine.service.launchers import Ended, Launcher
+from etc_engine.service.launchers import Ended, Launcher, UnreachableError
 from etc_engine.service.live import LiveResults, log_tail
 from etc_engine.service.queue import Entry, Queue
 from etc_engine.service.reading import Finished
@@ -68,6 +68,7 @@ class Supervisor:
         self._live, self._limits = live, settings.limits
         self._watches: dict[str, _Watch] = {}
         self._later: dict[str, float] = {}
+        self._closed_until = 0.0
         self._stopping, self._wake, self._taken_up = threading.Event(), threading.Event(), False
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
 
@@ -119,18 +120,16 @@ class Supervisor:
         moment = time.monotonic()
         self._later = {study: until for study, until in self._later.items() if until > moment}
         reading = sum(watch.ended is not None for watch in self._watches.values())
-        if len(running) - reading < self._launcher.concurrent:
+        if len(running) - reading < self._launcher.concurrent and moment >= self._closed_until:
             waiting = self._queue.first_waiting(frozenset(self._later))
             if waiting is not None:
                 self._launch(waiting)
                 self._wake.set()
 
     def _take_up(self) -> None:
-        """Note what an earlier service could not note any more."""
+        """Whatever ended a batch of an earlier service may have been the end of that service."""
         for entry in self._queue.entries("running", limit=-1):
-            self._queue.forgive(entry.id)  # whatever ended it may have been the end of the service
-            if not entry.batch:
-                self._queue.set_batch(entry.id, self._launcher.find(entry.id))
+            self._queue.forgive(entry.id)
         self._taken_up = True
 
     def _launch(self, entry: Entry) -> None:
@@ -141,6 +140,11 @@ class Supervisor:
             with self._store.log(entry.id).open("a") as file:
                 file.write(f"{START} {now()}\n")
             watch.batch = self._launcher.start(entry.id)
+        except UnreachableError as error:  # no fault of the study: it waits as long as that lasts
+            log.warning("supervisor: %s", error)
+            self._closed_until = time.monotonic() + self._launcher.interval
+            self._queue.forgive(entry.id)
+            self._queue.put_back(entry.id, str(error))
         except (OSError, EtcError) as error:
             self._try_again(self._queue.require(entry.id), str(error))
         else:
@@ -155,7 +159,12 @@ class Supervisor:
     def _look(self, entry: Entry, watch: _Watch) -> None:
         """See whether a batch has ended, and end it where it should."""
         moment, batch = time.monotonic(), watch.batch or entry.batch
-        if not entry.batch and batch:  # the queue was held by another program when the batch was started
+        if not batch:  # started by a service that could not note it any more, if at all
+            try:
+                batch = self._launcher.find(entry.id)
+            except UnreachableError:
+                return
+        if not entry.batch and batch:  # or the queue was held by another program when the batch was started
             self._queue.set_batch(entry.id, batch)
         if moment - watch.counted > COUNT_SECONDS:
             watch.counted = moment

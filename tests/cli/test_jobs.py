@@ -146,6 +146,16 @@ def test_killed_ranks_queue_a_slurm_job_again(site, status):
     assert f"ranks were killed (status {status})" in output
 
 
+def test_ranks_that_are_killed_before_they_begin_end_the_job_after_five_restarts(site):
+    words = {"STATUS": "143", "SLURM_JOB_ID": "17", "SLURM_RESTART_COUNT": "5"}
+    ended, calls, _ = run(site, "slurm.sh", "study.toml", "out.nc", **words)
+    assert (ended, "scontrol requeue 17" in calls) == (143, False)
+    begin = "mkdir -p out.nc.shards\necho > out.nc.shards/$$.run\nexit $STATUS\n"
+    write_program(site / "bin" / "etc-engine", begin)
+    ended, calls, _ = run(site, "slurm.sh", "study.toml", "out.nc", **words)
+    assert (ended, "scontrol requeue 17" in calls) == (0, True)
+
+
 def test_a_requeued_slurm_job_uses_up_the_numbers_of_earlier_steps(site):
     """MPI names shared memory after job and step: a step of the same number finds what killed ranks have left."""
     status, calls, output = run(site, "slurm.sh", "study.toml", "out.nc", SLURM_RESTART_COUNT="2")
