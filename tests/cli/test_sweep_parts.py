@@ -16,6 +16,7 @@ from etc_engine.sweep.dataset import differing_variables
 from etc_engine.sweep.parts import Part
 from etc_engine.sweep.plan import units_to_run
 from etc_engine.sweep.result_file import open_dataset
+from etc_engine.sweep.shards import frame, unframe
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 STUDY = """
@@ -151,7 +152,8 @@ def test_a_batch_job_that_finishes_nothing_ends(stand_in, study, tmp_path, monke
     (run,) = output.with_name("out.nc.shards").glob("*.run")
     for restart in range(1, 5):
         name = f"{run.stem}{restart}"
-        run.with_name(f"{name}.run").write_text(run.read_text().replace(run.stem, name))
+        record = (unframe(run.read_bytes()) or "").replace(run.stem, name)
+        run.with_name(f"{name}.run").write_bytes(frame(record))
     status, _, errors = stand_in(study, "-o", output, "--policy", "resume")
     assert status == 2  # which no script takes for a reason to start again
     assert "the last 5 starts of this job (slurm 17) finished no unit" in errors
