@@ -40,7 +40,8 @@ th { background: #f4f6fa; vertical-align: bottom; white-space: normal; }
 td.text, th.text { text-align: left; white-space: normal; overflow-wrap: break-word; }
 td.text:first-child { white-space: nowrap; }
 tr.broken td { background: #fde8e6; } .bad { color: #b42318; font-weight: 600; }
-img { max-width: 100%; height: auto; display: block; margin: 8px 0; }
+img { max-width: 100%; min-width: 640px; height: auto; display: block; margin: 8px 0; }
+@media (max-width: 560px) { body { padding: 16px 14px 40px; } nav a { display: inline-block; padding: 4px 0; } }
 pre { background: #f4f6fa; padding: 12px; border-radius: 6px; overflow-x: auto; font-size: 13px; }
 @media print { nav { display: none; } h2 { break-after: avoid; } img, tr { break-inside: avoid; } }
 """
@@ -386,7 +387,7 @@ def _range(values: Sequence[int]) -> str:
 
 def _picture(png: bytes, description: str) -> str:
     data = base64.b64encode(png).decode("ascii")
-    return f'<img alt="{escape(description)}" src="data:image/png;base64,{data}">\n'
+    return f'<div class="wide"><img alt="{escape(description)}" src="data:image/png;base64,{data}"></div>\n'
 
 
 def _table(

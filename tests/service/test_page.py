@@ -68,14 +68,16 @@ def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
     browser.until("return location.hash.startsWith('#/study/')")
     first = browser.until(f"const w = (() => {{ {BANDS} }})(); return w.length ? w : null")
     assert browser.text("main .state") == "running"
-    count = "/([0-9]+) (of|packings)/.exec(document.querySelector(s).innerText)[1]"
+    count = "/([0-9]+) (of|in all)/.exec(document.querySelector(s).innerText)[1]"
     told = f"return ['main p', 'figcaption'].map(s => {count})"
     for _ in range(10):  # one number above and below the figure at any moment
         above, below = browser.run(told)
         assert above == below
     assert 0 < browser.run("return document.querySelector('main progress').value") < 15
     browser.until("return document.querySelector('main .state').innerText === 'done'")
-    browser.until("return document.querySelector('figcaption').innerText.startsWith('Mean over 15 packings, with')")
+    browser.until(
+        "return document.querySelector('figcaption').innerText.startsWith('Each point: mean over 5 packings (15')"
+    )
     last = browser.run(BANDS)
     assert len(last) == 2
     assert sum(last) > sum(first)  # bands over all three densities at the end, over those with two realizations before

@@ -237,9 +237,10 @@ function study(id) {
     const { svg, legend } = figure(curve, shown, $("main").clientWidth);
     const level = Math.round(100 * curve.confidence);
     plot.replaceChildren(svg, h("ul", { class: "legend" }, legend.map(([name, sample]) => h("li", {}, sample, name))),
-      h("figcaption", {}, `Mean over ${curve.units} packings${curve.complete ? "" : " so far"}, with the ${level} % Student-t interval of the mean: ` +
-        "bands and bars. Packings without a path count as 0. Dashed: models." + (curve.method_error === null ? "" :
-        ` Estimated error of the method, not in the bands: up to ${(100 * curve.method_error).toPrecision(2)} %.`)));
+      h("figcaption", {}, `Each point: mean over ${packingsPerPoint(curve)} packings (${curve.units} in all${curve.complete ? "" : " so far"}), ` +
+        `with the ${level} % Student-t interval of the mean: bands and bars. Packings without a path count as 0. Dashed: models.` +
+        (curve.method_error === null ? "" :
+          ` Estimated error of the method, not in the bands: up to ${(100 * curve.method_error).toPrecision(2)} %.`)));
     fillTable(curve);
     fillModels(curve);
   }

@@ -4,7 +4,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#b65c93", "#c58a00", "#3a93c9"]; // told apart by the colour-blind
 const DASHES = ["7 4", "2 3", "10 3 2 3", "5 2", "1 4", "12 5"];
-const HEIGHT = 470, LEFT = 70, RIGHT = 20, TOP = 16, BOTTOM = 52;
+const LEFT = 70, RIGHT = 20, TOP = 16, BOTTOM = 52;
 
 function draw(tag, attributes, ...children) {
   const element = document.createElementNS(SVG, tag);
@@ -68,6 +68,29 @@ function mark(shape, x, y, colour) {
 
 const seriesName = series => series.name || "simulation";
 
+// Colour and shape of every curve: one colour for each contact angle (or for each value of the first quantity that has
+// several), and a shape for the rest.
+function looksOf(series) {
+  const values = series.map(one => one.values || {}), names = Object.keys(values[0] || {});
+  const several = names.filter(name => new Set(values.map(one => one[name])).size > 1);
+  const first = several.includes("contact_angle") ? "contact_angle" : several[0];
+  const others = one => JSON.stringify(several.filter(name => name !== first).map(name => one[name]));
+  const groups = [...new Set(values.map(one => one[first]))], shapes = [...new Set(values.map(others))];
+  return values.map((one, number) => {
+    const group = first === undefined ? number : groups.indexOf(one[first]);
+    return { colour: COLOURS[group % COLOURS.length],
+      shape: first === undefined ? number : shapes.indexOf(others(one)) + (shapes.length > 1 ? 0 : group) };
+  });
+}
+
+// How many packings a point is the mean of, in words: "4", or "3 to 4" where the points differ.
+function packingsPerPoint(curve) {
+  const counts = curve.series.flatMap(one => one.count).filter(count => count > 0);
+  if (!counts.length) return "0";
+  const few = Math.min(...counts), many = Math.max(...counts);
+  return few === many ? String(many) : `${few} to ${many}`;
+}
+
 // Runs of neighbouring points for which all the given values are there.
 function runs(places, ...lists) {
   const found = [[]];
@@ -80,7 +103,7 @@ function runs(places, ...lists) {
 
 // Answers the SVG and the entries of its legend; a narrow page gets a narrow figure, whose letters stay readable.
 function figure(curve, shownModels, room) {
-  const WIDTH = room < 600 ? 520 : 900;
+  const WIDTH = room < 600 ? Math.max(340, Math.round(room)) : 900, HEIGHT = room < 600 ? 380 : 470;
   const places = curve.along.values, across = range(places, 0.04, 0.05);
   const drawn = curve.models.filter(model => shownModels.has(model.name));
   const up = upright(curve, drawn, across);
@@ -120,8 +143,9 @@ function figure(curve, shownModels, room) {
     const sample = draw("path", { class: "model", d: "M1 7H33", "stroke-dasharray": dash });
     legend.push([model.title + absence(model, across, up), draw("svg", { class: "curve", viewBox: "0 0 34 14", "aria-hidden": "true" }, sample)]);
   });
+  const looks = looksOf(curve.series);
   curve.series.forEach((series, number) => {
-    const colour = COLOURS[number % COLOURS.length], name = seriesName(series);
+    const { colour, shape } = looks[number], name = seriesName(series);
     for (const run of runs(places, series.low, series.high)) {
       const low = run.map(i => at(places[i], series.low[i]));
       const high = run.map(i => at(places[i], series.high[i])).reverse();
@@ -137,14 +161,14 @@ function figure(curve, shownModels, room) {
           const y1 = Y(series.low[i]), y2 = Y(series.high[i]);
           plot.append(draw("path", { class: "bar", d: `M${x - 4} ${y1}h8M${x - 4} ${y2}h8M${x} ${y1}V${y2}`, stroke: colour, fill: "none" }));
         }
-        const point = mark(number, x, Y(series.mean[i]), colour);
+        const point = mark(shape, x, Y(series.mean[i]), colour);
         const width = series.low[i] === null ? "" : ` ± ${(0.5 * (series.high[i] - series.low[i])).toPrecision(2)}`;
         point.append(draw("title", {}, `${name}: ${series.mean[i].toPrecision(4)}${width}, ${series.count[i]} realizations`));
         plot.append(point);
       }
     }
     const sample = draw("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" },
-      draw("path", { d: "M1 7H33", stroke: colour, "stroke-width": 2 }), mark(number, 17, 7, colour));
+      draw("path", { d: "M1 7H33", stroke: colour, "stroke-width": 2 }), mark(shape, 17, 7, colour));
     legend.splice(number, 0, [name, sample]);
   });
   return { svg, legend };
