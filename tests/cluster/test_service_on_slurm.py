@@ -92,6 +92,7 @@ def test_cancelling_keeps_what_is_finished_and_resuming_continues(slurm, service
     assert len((place / "units").read_text().splitlines()) == UNITS
 
 
+@pytest.mark.slow
 def test_killed_ranks_and_an_absent_controller_do_not_fail_a_study(slurm, service, place):
     """The ranks die while the controller is away; it is away for longer than three commands are waited for."""
     with service(0.4, slurm_seconds=1.0) as running:
