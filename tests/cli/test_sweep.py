@@ -16,6 +16,7 @@ import xarray
 
 from etc_engine.sweep.dataset import differing_variables
 from etc_engine.sweep.result_file import open_dataset
+from etc_engine.sweep.shards import frame, unframe
 
 STAND_IN = Path(__file__).parent.parent / "stand_in.py"
 STUDY = """
@@ -296,7 +297,7 @@ def test_units_of_another_version_are_told_on_resume(stand_in, study, tmp_path):
     output = tmp_path / "out.nc"
     interrupted(study, output, tmp_path / "log", signal.SIGTERM)
     (run,) = output.with_name("out.nc.shards").glob("*.run")
-    run.write_text(run.read_text().replace('"engine": "', '"engine": "0.0.1 then '))
+    run.write_bytes(frame((unframe(run.read_bytes()) or "").replace('"engine": "', '"engine": "0.0.1 then ')))
     resumed = stand_in(study, "-o", output, "--policy", "resume")
     assert resumed.returncode == 0
     assert "finished units come from etc_engine 0.0.1 then" in resumed.stderr

@@ -91,7 +91,11 @@ def test_it_goes_on_from_its_last_state_with_the_same_bits(etc_engine, bed, monk
     ("old", "new", "words"),
     [
         ('files = "bed.dump"', 'files = "none.dump"', "there is no file"),
-        ('files = "bed.dump"', 'files = "bed.dump"\nframes = 2', "it takes all frames of a dump"),
+        (
+            'files = "bed.dump"',
+            'files = "bed.dump"\nframes = 2',
+            "needs a dump in packing.files, with all of its frames",
+        ),
         ("steps = 2", "step = 0.01", "give the steps from frame to frame"),
         ("steps = 2", "steps = 2\ntimes = [0.0, 1.0]", "the output times are those of the frames"),
         ("timestep = 0.001", "timestep = 0.0", "motion.timestep"),
