@@ -286,6 +286,17 @@ def test_error_estimate_is_near_the_error():
     assert estimate < CALIBRATED_ERROR
 
 
+@pytest.mark.parametrize("contrast", [1.0, 1.001])
+def test_error_estimate_covers_disks_that_hardly_differ_from_the_fluid(contrast):
+    """k = 1 + f (c - 1) up to the square of c - 1, whatever the arrangement."""
+    geometry = geometry_of("ls60_equal")
+    solid = np.full(geometry.count, contrast)
+    estimate = error_estimate(geometry, solid, 1.0)
+    exact = 1.0 + 0.6 * (contrast - 1.0)
+    error = np.abs(np.diag(cell_conductivity(geometry, solid, 1.0).tensor) / exact - 1.0).max()
+    assert error - 1e-6 < estimate < 1e-3
+
+
 def test_bad_input_is_refused_with_its_reason():
     geometry = geometry_of("ls60_equal")
     ones = np.ones(geometry.count)

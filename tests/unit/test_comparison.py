@@ -57,6 +57,18 @@ def test_a_binding_bound_may_be_reached_and_not_passed(made_sweep):
     assert int(beyond["bound_broken"].sum()) == 1
 
 
+@pytest.mark.parametrize(("excess", "broken"), [(1.005, 0), (1.02, 1)])
+def test_a_method_that_estimates_no_error_breaks_no_bound_of_pores_that_conduct_by_little(made_sweep, excess, broken):
+    """Disks of 2 W/(m K) in pores of 1.9: the bounds lie closer together than the methods are exact."""
+    upper = {
+        f: evaluate("hashin_shtrikman_upper", k1=1.9, k2=2.0, fraction=f, dimension=2)
+        for f in (0.5, 0.6, 0.7, 0.8, 0.9)
+    }
+    dataset = made_sweep(OVERLAP + "[pores]\nconductivity = 1.9\n", lambda f, *_: excess * upper[f])
+    assert np.isnan(dataset["model_error_estimate"]).all()
+    assert evaluate_models(dataset).attrs["bound_broken"] == broken
+
+
 def test_bonded_contacts_are_told_but_not_bound(made_sweep):
     result = evaluate_models(made_sweep(BONDED, lambda *_: 1.99))
     assert result.attrs["bounds_bind"] == 0
