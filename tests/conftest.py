@@ -20,6 +20,14 @@ settings.load_profile("repeatable")
 DATA = Path(__file__).parent / "published" / "data"
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """On several processes the tests of a file stay together, and those that share one Slurm."""
+    if config.pluginmanager.hasplugin("xdist"):
+        for item in items:
+            group = "cluster" if item.path.parent.name == "cluster" else str(item.path)
+            item.add_marker(pytest.mark.xdist_group(group))
+
+
 @pytest.fixture(scope="session")
 def feng_particles() -> ParticlePacking:
     """The 12-particle assembly of Feng et al. 2008, Table 2."""
