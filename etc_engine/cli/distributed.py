@@ -95,7 +95,7 @@ def _solve(
 
     start = time.perf_counter()
     asked = SolveRequest(**given)
-    asked.refuse_old_words()
+    asked.refuse_words()
     unheeded = {"-o": output, "--vtk": vtk, "--plot": plot, "--full": full, "--contacts": dumped.contacts}
     _refuse_unheeded({**unheeded, "--types": words.types, "--crop": words.crop}, asked)
     conduction = Conduction(asked.engine, asked.method or "chord", {"distributed": True})

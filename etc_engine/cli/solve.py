@@ -106,13 +106,13 @@ def solve_command(
 
     from etc_engine.cli.options import print_json
     from etc_engine.errors import InputError
-    from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings
+    from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings, rarefied_warnings
     from etc_engine.realization import field_along, find_engine
 
     asked = SolveRequest(**given)
-    asked.refuse_old_words()
-    engine = find_engine(asked.engine)
     outputs = SolveOutputs(output, vtk, plot)
+    asked.refuse_words(outputs.wanted)
+    engine = find_engine(asked.engine)
     outputs.check(particles)
     table = read_sample(particles, words)
     elastic = asked.physics.youngs_modulus, asked.physics.poisson_ratio
@@ -142,7 +142,10 @@ def solve_command(
         warn(digit_warnings(table, gap, bonded=asked.takes_gap))
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
     warn(box_warnings(table, driven, gap))
-    warn(excess_warnings(result.tensor, medium.conductivity, medium.pores, result.model_error))
+    warn(
+        rarefied_warnings(medium)
+        + excess_warnings(result.tensor, medium.conductivity, medium.pores, result.model_error)
+    )
     if dumped.contacts is None:
         warn_of_gap(
             asked, medium, record["conductivity"], partial(_with_gap, asked, table, particles, method, axes[:1])

@@ -39,8 +39,14 @@ class SolveRequest:
     contact_resistance: float
     physics: PhysicsWords
 
-    def refuse_old_words(self) -> None:
-        """Refuse spellings of earlier versions, and options that mean nothing together."""
+    def refuse_words(self, fields: bool = False) -> None:
+        """Refuse spellings of earlier versions, and options that mean nothing together.
+
+        Parameters
+        ----------
+        fields : bool
+            Whether a field is to be written; it would be that of walls of 1 and 0, not of ``--wall-temperatures``.
+        """
         from etc_engine.errors import InputError
 
         if self.method == "pipe" or self.pipe_resistance is not None:
@@ -53,6 +59,11 @@ class SolveRequest:
                 )
             raise InputError(f"--bond-gap has no effect with the contact rule {self.rule}: leave it out")
         self.physics.refuse_two_resistances(self.contact_resistance)
+        if fields and self.physics.walls is not None:
+            raise InputError(
+                "--wall-temperatures gives conductivities: no field at the local temperature is written; leave out -o, "
+                "--plot and --vtk, or the wall temperatures"
+            )
 
     @property
     def bonded(self) -> bool:

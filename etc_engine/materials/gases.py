@@ -39,6 +39,9 @@ NAMES: Mapping[str, str] = MappingProxyType(
 )
 """Names of gases, as a user writes them, and as CoolProp does."""
 
+HIGHEST = 1e8
+"""Above this pressure [Pa] the correlations of conductivity and viscosity have no data behind them."""
+
 DILUTE = 1e3
 """Below this pressure [Pa] a gas is taken at this pressure: conductivity, viscosity, cp and gamma of a dilute gas do
 not depend on it."""
@@ -246,6 +249,8 @@ def _pure(name: str, temperature: float, pressure: float) -> Gas:
     if key not in NAMES:
         raise InputError(f"there is no gas named {name!r}; there are: {', '.join(k for k in NAMES if len(k) > 3)}")
     fluid = NAMES[key]
+    if pressure > HIGHEST:
+        raise InputError(f"{name} at {pressure:g} Pa: the properties of gases hold up to {HIGHEST:g} Pa")
     properties = _coolprop()
     state = ("T", temperature, "P", max(pressure, DILUTE), fluid)
     where = f"{name} at {temperature:g} K and {pressure:g} Pa"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from etc_engine.box import AXES, Box
+from etc_engine.medium.medium import Medium
 from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.pores import VACUUM, Pores
 from etc_engine.particle_files.precision import doubtful_contacts
@@ -146,4 +147,24 @@ def excess_warnings(tensor: ArrayLike, conductivity: ArrayLike, pores: Pores = V
     return [
         f"the conductivity {most:.6g} W/(m K) exceeds that of the particles, {best:.6g}: walls or contacts go "
         "through particles, see --box and the contact rule"
+    ]
+
+
+def rarefied_warnings(medium: Medium) -> list[str]:
+    """A gas whose temperature jump is longer than a particle radius is no continuum between the particles.
+
+    Examples
+    --------
+    >>> from etc_engine.box import Box
+    >>> from etc_engine.packing import ParticlePacking
+    >>> sphere = ParticlePacking([[0.5, 0.5, 0.5]], [0.5], Box((1.0, 1.0, 1.0)))
+    >>> rarefied_warnings(Medium(sphere, 1.0, pores=Pores(0.1, jump_length=0.2)))
+    []
+    """
+    jump, radius = 0.5 * medium.pores.jump_length, float(medium.packing.radii.mean())
+    if jump <= radius:
+        return []
+    return [
+        f"the temperature jump of the gas at one surface is {jump:.3g} m long, more than the mean radius {radius:.3g} "
+        "m: the gas is no continuum and its share of the conductivity is not reliable; pressure 0 gives the exact limit"
     ]

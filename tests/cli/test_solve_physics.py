@@ -159,6 +159,9 @@ def test_walls_of_two_temperatures(tmp_path, capfd):
     every = solved(capfd, *walled, *gas, "--wall-temperatures", "300:900")
     assert set(every["conductivity_between_walls_per_axis"]) == {"x", "y", "z"}
     assert every["conductivity_between_walls_per_axis"]["y"] == pytest.approx(every["conductivity_between_walls"])
+    rare = ["--gas", "helium", "--pressure", "100", "--material", "alumina", "--temperature", "600"]
+    assert run(["solve", *bed, *rare]) == 0
+    assert "the gas is no continuum" in capfd.readouterr().err
     partly = solved(capfd, *bed[:-2], "--axis", "all", *gas, "--wall-temperatures", "300:900")
     assert set(partly["conductivity_between_walls_per_axis"]) == {"z"}
     assert partly["conductivity_between_walls"] == pytest.approx(far["conductivity_between_walls"], rel=1e-9)
@@ -169,6 +172,7 @@ def test_walls_of_two_temperatures(tmp_path, capfd):
     [
         (["--wall-temperatures", "900"], "two temperatures"),
         (["--wall-temperatures", "900:600"], "method facets, found"),
+        (["--wall-temperatures", "900:600", "--plot", "field.png"], "no field at the local temperature is written"),
     ],
 )
 def test_what_walls_need(bed, capfd, extra, message):

@@ -59,8 +59,14 @@ def test_jump_length_against_the_length_of_zehner_bauer_schluender(name, a, pres
     assert 2.0 * jump_length(gas, a) == pytest.approx(length, rel=2e-3)  # cp - cv = R/M only for an ideal gas
 
 
+def test_a_pressure_beyond_the_correlations_is_refused():
+    """At 8e8 Pa they give helium a conductivity of .004 W/(m K), at 1e9 Pa a negative one."""
+    with pytest.raises(InputError, match=r"hold up to 1e\+08 Pa"):
+        gas_state("helium", 600.0, 2e8)
+
+
 def test_vacuum_and_continuum_limits_are_exact():
-    vacuum, dense = gas_state("helium", 500.0, 0.0), gas_state("helium", 500.0, 1e9)
+    vacuum, dense = gas_state("helium", 500.0, 0.0), gas_state("helium", 500.0, 1e8)
     assert vacuum.mean_free_path == math.inf
     jump = jump_length(vacuum, 0.5)
     assert vacuum.conductivity / (1e-6 + 2.0 * jump) == 0.0
