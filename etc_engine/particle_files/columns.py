@@ -158,13 +158,17 @@ class ColumnReader:
         if not lines:
             return
         columns = list(self.numeric.values())
+        whole = sorted(columns) == list(range(self.layout.width))  # numpy itself compares the widths of lines
+        wanted = None if whole else columns
         try:
             batch = np.loadtxt(
-                lines, usecols=columns, ndmin=2, comments=None, delimiter=self.separator, dtype=np.float64
+                lines, usecols=wanted, ndmin=2, comments=None, delimiter=self.separator, dtype=np.float64
             )
         except ValueError:
             batch = None
-        if batch is None or len(batch) != len(lines) or not self._even(lines):
+        if batch is not None and whole:
+            batch = batch[:, columns] if batch.shape[1] == self.layout.width else None
+        if batch is None or len(batch) != len(lines) or not (whole or self._even(lines)):
             raise InputError(self._first_bad(lines, numbers))
         self._batches.append(batch)
         if "types" in self.layout.others:

@@ -6,19 +6,19 @@ import csv
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TextIO
+from typing import TextIO, TypeAlias
 
 from etc_engine.box import AXES, Box
 from etc_engine.errors import InputError
-from etc_engine.particle_files.columns import ColumnReader, Layout, batches, find_layout
+from etc_engine.particle_files.columns import ColumnReader, Layout, find_layout
 from etc_engine.particle_files.digits import PrintedColumn, PrintedColumns
 from etc_engine.particle_files.sample import Rows, Sample, make_table
-from etc_engine.particle_files.streams import BOM, open_stream
+from etc_engine.particle_files.streams import BOM, LONGEST, line_blocks, open_stream
 from etc_engine.particle_files.table import ParticleTable
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
-LONGEST = 1 << 20
-"""No line of a table of particles has more bytes than this."""
+Numbered: TypeAlias = tuple[Sequence[int], list[str]]
+"""Numbers of some lines in their file, and their texts."""
 
 
 def read_csv(path: Path | str, box: Box | None = None, sample: Sample | None = None) -> ParticleTable:
@@ -68,16 +68,35 @@ def csv_rows(path: Path | str, radius_column: str | None = None) -> Rows:
     """
     path = Path(path)
     with open_stream(path) as stream:
-        lines = content_lines(path, stream)
-        number, header = next(lines, (0, ""))
-        if not header:
-            raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
-        names, separator = table_header(path, number, header)
+        names, separator, lines = table_opening(path, line_blocks(stream))
         return table_rows(path, names, separator, lines, radius_column)
 
 
+def table_opening(path: Path, blocks: Iterable[bytes]) -> tuple[list[str], str | None, Iterator[Numbered]]:
+    """Names of the columns of a table, what separates them, and the lines after the header.
+
+    Parameters
+    ----------
+    path : Path
+    blocks : iterable of bytes
+        The file from its first byte, in blocks of whole lines. None after the one with the header is read.
+
+    Raises
+    ------
+    InputError
+        If there is no header.
+    """
+    lines = numbered_lines(path, blocks)
+    for numbers, texts in lines:
+        row = next((row for row, text in enumerate(texts) if _is_header(text)), None)
+        if row is not None:
+            names, separator = _header(path, numbers[row], texts[row].strip().lstrip("# \t"))
+            return names, separator, chain([(numbers[row + 1 :], texts[row + 1 :])], lines)
+    raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
+
+
 def table_rows(
-    path: Path, names: Sequence[str], separator: str | None, lines: Iterator[tuple[int, str]], radius_column: str | None
+    path: Path, names: Sequence[str], separator: str | None, lines: Iterable[Numbered], radius_column: str | None
 ) -> Rows:
     """Rows of a table whose columns are known.
 
@@ -87,8 +106,8 @@ def table_rows(
     names : sequence of str
     separator : str or None
         Between words; None is white space.
-    lines : iterator of (int, str)
-        Number and text of each line.
+    lines : iterable of (sequence of int, list of str)
+        Numbers and texts of lines, in batches. Blank lines and comments are left out.
     radius_column : str, optional
 
     Raises
@@ -115,7 +134,7 @@ def table_layout(path: Path, names: Sequence[str], radius_column: str | None) ->
     return layout
 
 
-def part_of_table(path: Path, layout: Layout, separator: str | None, lines: Iterator[tuple[int, str]]) -> Rows:
+def part_of_table(path: Path, layout: Layout, separator: str | None, lines: Iterable[Numbered]) -> Rows:
     """Rows of some lines of a table, possibly of none; parameters as of `table_rows`.
 
     Raises
@@ -123,8 +142,8 @@ def part_of_table(path: Path, layout: Layout, separator: str | None, lines: Iter
     InputError
     """
     reader = ColumnReader(str(path), layout, separator)
-    for batch in batches(lines):
-        reader.feed(_unquoted([text for _, text in batch], separator), [number for number, _ in batch])
+    for numbers, texts in map(_content, lines):
+        reader.feed(_unquoted(texts, separator), numbers)
     radii, digits = reader.column("radius"), reader.digits()
     assert radii is not None
     half = 0.5 if layout.halved else 1.0
@@ -161,49 +180,51 @@ def write_csv(target: Path | str | TextIO, table: ParticleTable) -> None:
     writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
 
 
-def numbered_lines(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:
-    """Lines of a text file with their numbers from 1.
+def numbered_lines(path: Path, blocks: Iterable[bytes]) -> Iterator[Numbered]:
+    """Lines of blocks of text in batches, with their numbers from 1.
+
+    Old line ends (a carriage return alone) count.
 
     Raises
     ------
     InputError
         If it is no text in UTF-8.
     """
-    yield from enumerate(_lines(path, stream), 1)
+    read = 0
+    for block in blocks:
+        lines = _decoded(path, block if read else block.removeprefix(BOM)).splitlines()
+        longest = max(map(len, lines), default=0)
+        if longest >= LONGEST:
+            raise InputError(f"{path} is not a table of text: it has a line of {longest} characters or more")
+        yield range(read + 1, read + 1 + len(lines)), lines
+        read += len(lines)
 
 
-def content_lines(path: Path, stream: Iterable[bytes]) -> Iterator[tuple[int, str]]:
-    """Lines with their numbers, without blank ones and comments; a header behind ``#`` is no comment."""
-    headed = False
-    for number, raw in numbered_lines(path, stream):
-        text = raw.strip()
-        if not text:
-            continue
-        if text.startswith("#"):
-            if headed or not _names_positions(text.lstrip("# \t")):
-                continue
-            text = text.lstrip("# \t")
-        headed = True
-        yield number, text
+def _decoded(path: Path, block: bytes) -> str:
+    try:
+        text = block.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} is not in a known format: it is binary, or text in another encoding than UTF-8 ({error.reason})"
+        ) from None
+    if "\x00" in text:
+        raise InputError(f"{path} is not a table of text: it holds zero bytes")
+    return text
 
 
-def _lines(path: Path, stream: Iterable[bytes]) -> Iterator[str]:
-    """Lines of text; old line ends (a carriage return alone) count."""
-    first = True
-    for line in stream:
-        if len(line) > LONGEST:
-            raise InputError(f"{path} is not a table of text: it has a line of {len(line)} bytes")
-        try:
-            text = (line.removeprefix(BOM) if first else line).decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise InputError(
-                f"{path} is not in a known format: it is binary, or text in another encoding than UTF-8 "
-                f"({error.reason})"
-            ) from None
-        if "\x00" in text:
-            raise InputError(f"{path} is not a table of text: it holds zero bytes")
-        first = False
-        yield from text.splitlines() or [""]
+def _content(batch: Numbered) -> Numbered:
+    """A batch without blanks at the ends of lines, blank lines and comments."""
+    numbers, lines = batch[0], [text.strip() for text in batch[1]]
+    if all(text and text[0] != "#" for text in lines):
+        return numbers, lines
+    kept = [row for row, text in enumerate(lines) if text and text[0] != "#"]
+    return [numbers[row] for row in kept], [lines[row] for row in kept]
+
+
+def _is_header(text: str) -> bool:
+    """Whether a line is the first one of content; names of positions behind ``#`` are no comment."""
+    text = text.strip()
+    return bool(text) and (not text.startswith("#") or _names_positions(text.lstrip("# \t")))
 
 
 def _names_positions(text: str) -> bool:
@@ -211,7 +232,7 @@ def _names_positions(text: str) -> bool:
     return {"x", "y"} <= words or {"points:0", "points:1"} <= words
 
 
-def table_header(path: Path, number: int, header: str) -> tuple[list[str], str | None]:
+def _header(path: Path, number: int, header: str) -> tuple[list[str], str | None]:
     """Names of the columns, and what separates them."""
     separator = next((mark for mark in SEPARATORS if mark in header), None)
     names = [name.strip().strip('"') for name in (header.split(separator) if separator else header.split())]

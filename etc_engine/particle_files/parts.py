@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from io import BytesIO
+from itertools import chain
 from pathlib import Path
 from typing import BinaryIO
 
@@ -14,13 +16,13 @@ import numpy as np
 
 from etc_engine.errors import InputError
 from etc_engine.particle_files.columns import ColumnReader, Layout, batches, find_layout
-from etc_engine.particle_files.csv_files import content_lines, part_of_table, table_header, table_layout
+from etc_engine.particle_files.csv_files import numbered_lines, part_of_table, table_layout, table_opening
 from etc_engine.particle_files.dumps import choose_frame, frame_table, sorted_rows
 from etc_engine.particle_files.formats import CSV, DUMP, NETCDF, format_to_read
 from etc_engine.particle_files.items import blocks_at, frames_of
 from etc_engine.particle_files.netcdf import check_netcdf, netcdf_part
 from etc_engine.particle_files.sample import Rows, Sample
-from etc_engine.particle_files.streams import GZIP, ZSTANDARD
+from etc_engine.particle_files.streams import GZIP, ZSTANDARD, line_blocks
 from etc_engine.ranks import Alone, Ranks, together
 
 PIECE = 1 << 24
@@ -160,7 +162,8 @@ def _dump_table(path: Path, sample: Sample, starts: Sequence[int]) -> _Table:
 
     def read(part: int, parts: int) -> Rows:
         reader, last = ColumnReader(place, layout), ""
-        raw = _lines(path, *_cuts(block.start, block.end, part, parts))
+        blocks = _blocks(path, *_cuts(block.start, block.end, part, parts))
+        raw = chain.from_iterable(map(BytesIO, blocks))
         lines = (line.decode("utf-8", errors="replace") for line in raw)
         for batch in batches(line for line in lines if line.strip()):
             reader.feed(batch)
@@ -175,7 +178,7 @@ def _dump_table(path: Path, sample: Sample, starts: Sequence[int]) -> _Table:
     return _Table(read, count)
 
 
-def _csv_table(path: Path, sample: Sample, _: Sequence[int]) -> _Table:
+def _csv_table(path: Path, sample: Sample, __: Sequence[int]) -> _Table:
     """A table of text with a header."""
     raw: list[bytes] = []
 
@@ -185,16 +188,13 @@ def _csv_table(path: Path, sample: Sample, _: Sequence[int]) -> _Table:
             yield line
 
     with path.open("rb") as stream:
-        line, header = next(content_lines(path, kept(stream)), (0, ""))
-    if not header:
-        raise InputError(f"{path} is empty: expected a header such as 'x,y,radius'")
-    names, separator = table_header(path, line, header)
+        names, separator, _ = table_opening(path, kept(stream))
     layout = _slim(table_layout(path, names, sample.radius_column))
     start, end = sum(map(len, raw)), path.stat().st_size
 
     def read(part: int, parts: int) -> Rows:
-        lines = _lines(path, *_cuts(start, end, part, parts))
-        return part_of_table(path, layout, separator, content_lines(path, lines))
+        blocks = _blocks(path, *_cuts(start, end, part, parts))
+        return part_of_table(path, layout, separator, numbered_lines(path, blocks))
 
     return _Table(read)
 
@@ -222,19 +222,13 @@ def _cuts(start: int, end: int, part: int, parts: int) -> tuple[int, int]:
     return start + (end - start) * part // parts, start + (end - start) * (part + 1) // parts
 
 
-def _lines(path: Path, start: int, end: int) -> Iterator[bytes]:
-    """Lines of a file that begin at the bytes from ``start`` to ``end``."""
+def _blocks(path: Path, start: int, end: int) -> Iterator[bytes]:
+    """The lines of a file that begin at the bytes from ``start`` to ``end``, in blocks."""
     with path.open("rb") as stream:
         stream.seek(max(start - 1, 0))
-        position = stream.tell()
         if start > 0:
-            position += len(stream.readline())  # the end of the line before, alone if one begins at ``start``
-        while position < end:
-            line = stream.readline()
-            if not line:
-                return
-            position += len(line)
-            yield line
+            stream.readline()  # the end of the line before, alone if one begins at ``start``
+        yield from line_blocks(stream, end - stream.tell())
 
 
 def _frame_marks(path: Path, reader: Reader, part: int, parts: int) -> list[int]:

@@ -122,7 +122,7 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
     dimension = len(bounds)
     whole = Box(tuple((bounds[:, 1] - bounds[:, 0]).tolist()), periodic)
     centers = rows.positions[:, :dimension] - bounds[:, 0]
-    outside = np.flatnonzero(((centers < 0.0) | (centers > np.asarray(whole.lengths))).any(axis=1))
+    outside = np.any((centers < 0.0) | (centers > np.asarray(whole.lengths)), axis=1)
     cropped = (False,) * (2 * dimension)
     keep = np.arange(len(centers))
     if sample.crop:
@@ -139,7 +139,7 @@ def make_table(rows: Rows, sample: Sample) -> ParticleTable:
     columns = {name: getattr(rows, name) for name in ("conductivity", "ids", "types", "temperature")}
     return ParticleTable(
         packing=ParticlePacking(centers, rows.radii[keep], box),
-        wrapped=np.intersect1d(keep, outside).size if rows.bounds is None else 0,
+        wrapped=int(outside[keep].sum()) if rows.bounds is None else 0,
         origin=tuple(bounds[:, 0].tolist()),
         printed=rows.printed,
         cropped=cropped,

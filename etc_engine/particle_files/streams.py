@@ -20,6 +20,10 @@ from etc_engine.errors import InputError
 
 BOM = b"\xef\xbb\xbf"
 GZIP, ZSTANDARD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
+BLOCK = 1 << 22
+"""Bytes that are read at a time."""
+LONGEST = 1 << 20
+"""No line of a table of particles has as many bytes as this."""
 
 
 @contextmanager
@@ -112,3 +116,15 @@ def _zstandard(raw: BinaryIO) -> Iterator[BinaryIO]:
             yield cast("BinaryIO", io.BufferedReader(stream))
     except zstandard.ZstdError as error:
         raise InputError(f"cannot decompress Zstandard: {error}") from None
+
+
+def line_blocks(stream: BinaryIO, size: int = sys.maxsize) -> Iterator[bytes]:
+    """The lines of a stream that begin within its next ``size`` bytes, in blocks of whole lines.
+
+    A block ends within a line only where that line is longer than ``LONGEST``.
+    """
+    while size > 0 and (block := stream.read(min(BLOCK, size))):
+        if not block.endswith(b"\n"):
+            block += stream.readline(LONGEST)
+        size -= len(block)
+        yield block

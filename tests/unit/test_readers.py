@@ -13,8 +13,11 @@ import pytest
 from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.packing.particles import ParticlePacking
+from etc_engine.particle_files import streams
+from etc_engine.particle_files.csv_files import csv_rows
 from etc_engine.particle_files.dumps import read_dump, read_trajectory
-from etc_engine.particle_files.formats import count_frames, format_to_read, read_table, write_particles
+from etc_engine.particle_files.formats import CSV, count_frames, format_to_read, read_table, write_particles
+from etc_engine.particle_files.parts import READERS
 from etc_engine.particle_files.sample import Sample
 from etc_engine.particle_files.table import ParticleTable
 
@@ -300,3 +303,21 @@ def test_every_format_is_told_by_its_content(tmp_path):
     for name, text in {"dump": DUMPS["plain"], "XYZ file": XYZ, "YADE text file": TABLES["YADE"]}.items():
         (tmp_path / "a").write_text(text)
         assert format_to_read(tmp_path / "a").name == name
+
+
+@pytest.mark.parametrize("size", [1, 7, 40, 1000])
+def test_tables_in_blocks_of_any_size_have_the_same_rows_and_line_numbers(tmp_path, monkeypatch, size):
+    """Blocks end within lines, at their ends, and among comments; parts of a file are read by the same reader."""
+    path = tmp_path / "bed.csv"
+    lines = [f"\t{k / 7!r}, {k / 3!r} ,0.1  " if k % 5 else "# x,y,radius\r\n\r" for k in range(1, 60)]
+    path.write_text("# made by hand\n\n x,y,radius \n" + "\n".join(lines), encoding="utf-8", newline="")
+    whole = csv_rows(path)
+    monkeypatch.setattr(streams, "BLOCK", size)
+    assert np.array_equal(csv_rows(path).positions, whole.positions)
+    parts = [READERS[CSV.name](path, Sample(), []).read(part, 4).positions for part in range(4)]
+    assert np.array_equal(np.concatenate(parts), whole.positions)
+    assert whole.positions.tolist() == [[k / 7, k / 3] for k in range(1, 60) if k % 5]
+    path.write_text(path.read_text(encoding="utf-8").replace(repr(44 / 7), "x"), encoding="utf-8", newline="")
+    bad = next(n for n, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1) if line.startswith("\tx"))
+    with pytest.raises(InputError, match=f"line {bad}: x is not a number: 'x'"):
+        csv_rows(path)
