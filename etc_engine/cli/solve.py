@@ -122,14 +122,15 @@ def solve_command(
     method = asked.method or engine.default_method(medium.dimension, medium.pores.conduct)
     result = asked.solve(medium, engine, method, axes)
     between = asked.between_walls(medium, method, axes)
-    try:
-        field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
-    except InputError:
-        if full or outputs.wanted:
-            raise
-        field = None  # a method without fields still has its conductivity
+    field = None
+    if full or outputs.wanted or medium.pores.conduct:  # in pores that conduct, the field counts the links
+        try:
+            field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
+        except InputError:
+            if full or outputs.wanted:
+                raise
     record = {**_record(asked, method, result, medium if field is None else field.medium, axes), **between}
-    if field is not None:
+    if field is not None and full:
         each = zip(field.medium.links.pairs.tolist(), field.contact_temperatures.tolist(), strict=True)
         record["contact_temperatures"] = [{"particles": pair, "temperature": value} for pair, value in each]
     for remark in engine.remarks(method, result):
@@ -153,8 +154,6 @@ def solve_command(
     if field is not None:
         write_outputs(outputs, field, record, table)
     record["seconds"] = time.perf_counter() - start
-    if not full:
-        record.pop("contact_temperatures", None)
     if as_json:
         print_json(record)
     else:

@@ -56,6 +56,8 @@ from etc_engine.laws.disk import resistance_matrices as uniform_matrices
 _BOUNDS = np.array([0.1, 0.3, 0.45, 0.65, 0.85, 2.0])
 _COUNTS = np.array([2, 3, 4, 8, 16, 32], dtype=np.int64)
 _POINTS = np.array([[math.cos(math.pi * (n + 0.5) / m) if n < m else 0.0 for n in range(32)] for m in _COUNTS])
+CHUNK = 1 << 12
+"""Half-angles that are worked on at a time: intermediate results stay in the cache."""
 CROWDING = 0.25
 """Crowding of a disk at which w is 1 - 1/e: a hexagonal lattice has .14 at 15 degrees, .43 at 20."""
 SHARPNESS = 6
@@ -151,17 +153,18 @@ _TABLES = _tables()
 
 def own_modes(alpha: Floats, cutting: Flags | None) -> OwnModes:
     """The part of the modes of each chord that its half-angle gives; arguments of `resistance_matrices`."""
+    columns = np.empty((6, alpha.size))
+    for start in range(0, alpha.size, CHUNK):
+        columns[:, start : start + CHUNK] = _of_half_angles(alpha[start : start + CHUNK])
+    return OwnModes(*columns, np.ones(alpha.size, dtype=np.bool_) if cutting is None else cutting)
+
+
+def _of_half_angles(alpha: Floats) -> tuple[Floats, ...]:
+    """The columns of `OwnModes` that are functions of the half-angle."""
     diagonal = chord_resistance(alpha)
     conductance, level, even, first, second = chebyshev.chebval(4.0 * alpha / np.pi - 1.0, _TABLES)
-    return OwnModes(
-        diagonal,
-        0.5 * (diagonal - lune_resistance(alpha)),
-        level,
-        even,
-        first - 0.25 / (conductance * alpha),
-        second,
-        np.ones(alpha.size, dtype=np.bool_) if cutting is None else cutting,
-    )
+    extra = 0.5 * (diagonal - lune_resistance(alpha))
+    return diagonal, extra, level, even, first - 0.25 / (conductance * alpha), second
 
 
 def resistance_matrices(

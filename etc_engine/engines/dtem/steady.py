@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -178,6 +178,7 @@ def solve_steady(
     check_arcs(made.sides)
     if made.every_side is not None:
         check_arcs(made.every_side)
+        made = replace(made, every_side=None)  # as large as the sides: freed before the solver takes its memory
     elements = made.variant.elements(made.sides, made.conductivity, made.modes)
     system = assemble(elements, made.lift, made.prescribed)
     # a uniform temperature lives on mode 0 alone
