@@ -156,7 +156,9 @@ def own_modes(alpha: Floats, cutting: Flags | None) -> OwnModes:
     columns = np.empty((6, alpha.size))
     for start in range(0, alpha.size, CHUNK):
         columns[:, start : start + CHUNK] = _of_half_angles(alpha[start : start + CHUNK])
-    return OwnModes(*columns, np.ones(alpha.size, dtype=np.bool_) if cutting is None else cutting)
+    diagonal, shift, level, even, first, second = columns
+    cuts = np.ones(alpha.size, dtype=np.bool_) if cutting is None else cutting
+    return OwnModes(diagonal, shift, level, even, first, second, cuts)
 
 
 def _of_half_angles(alpha: Floats) -> tuple[Floats, ...]:

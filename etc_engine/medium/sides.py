@@ -137,39 +137,40 @@ def wall_normals(walls: Ints, dimension: int) -> Floats:
 def contact_sides(network: ContactNetwork, cuts: InsulatedCuts = NO_CUTS) -> ContactSides:
     """The two sides of every particle contact and the one side of every wall contact, by particle."""
     packing, m = network.packing, network.count
-    radii = packing.radii[network.pairs]
-    share = radii[:, :1] / radii.sum(axis=1, keepdims=True)
-    normals = wall_normals(network.walls, packing.dimension)
     owner = np.concatenate([network.pairs[:, 0], network.pairs[:, 1], network.wall_particles])
-    nodes = np.concatenate([np.arange(m), np.arange(m), m + np.arange(network.walls.size)])
-    arms = np.concatenate(
-        [
-            network.branches * share,
-            -network.branches * (1.0 - share),
-            normals * packing.radii[network.wall_particles, None],
-        ]
-    )
-    alpha = np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])
-    parts = np.concatenate([np.full(2 * m, 0.5), np.ones(network.walls.size)])
-    lumped = parts * np.concatenate([network.lumped_resistances, network.wall_lumped_resistances])[nodes]
-    area = np.zeros(nodes.size) if network.area_resistances is None else parts * network.area_resistances[nodes]
     order = np.argsort(owner, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=packing.count))])
     place = np.empty_like(order)
     place[order] = np.arange(order.size)
+    nodes = np.concatenate([np.arange(m), np.arange(m), m + np.arange(network.walls.size)])[order]
+    parts = np.concatenate([np.full(2 * m, 0.5), np.ones(network.walls.size)])[order]
+    lumped = np.concatenate([network.lumped_resistances, network.wall_lumped_resistances])[nodes]
+    lumped *= parts
+    area = np.zeros(nodes.size) if network.area_resistances is None else parts * network.area_resistances[nodes]
+    del owner, parts  # of millions of contacts: each column is made and put in order alone
     return ContactSides(
         offsets=offsets,
-        nodes=nodes[order],
-        arms=arms[order],
-        alpha=alpha[order],
-        lumped_resistances=lumped[order],
-        area_resistances=area[order],
-        reaches=network.reaches[nodes][order],
+        nodes=nodes,
+        arms=_arms(network)[order],
+        alpha=np.concatenate([network.angles[:, 0], network.angles[:, 1], network.wall_angles])[order],
+        lumped_resistances=lumped,
+        area_resistances=area,
+        reaches=network.reaches[nodes],
         radii=packing.radii,
         of_contacts=place[: 2 * m].reshape(2, m).T,
         of_walls=place[2 * m :],
         cuts=cuts,
     )
+
+
+def _arms(network: ContactNetwork) -> Floats:
+    """From the centre to the contact: of the first sides of all contacts, the second ones, and those at walls."""
+    packing = network.packing
+    radii = packing.radii[network.pairs]
+    share = radii[:, :1] / radii.sum(axis=1, keepdims=True)
+    normals = wall_normals(network.walls, packing.dimension)
+    at_walls = normals * packing.radii[network.wall_particles, None]
+    return np.concatenate([network.branches * share, -network.branches * (1.0 - share), at_walls])
 
 
 def check_arcs(sides: ContactSides) -> None:

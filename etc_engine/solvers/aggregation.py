@@ -50,7 +50,7 @@ def aggregation_hierarchy(matrix: csr_matrix) -> Any:
     from pyamg.relaxation.smoothing import change_smoothers
 
     levels = []
-    current, near_kernel = matrix.sorted_indices(), np.ones(matrix.shape[0])  # aggregates follow the order of columns
+    current, near_kernel = _sorted(matrix), np.ones(matrix.shape[0])  # aggregates follow the order of columns
     while True:
         level = MultilevelSolver.Level()
         level.A = current
@@ -62,11 +62,16 @@ def aggregation_hierarchy(matrix: csr_matrix) -> Any:
             break  # nothing aggregates any more
         near_kernel = coarse_kernel
         level.P = _smoothed(current, tentative)
-        level.R = level.P.T.tocsr()
-        current = csr_matrix(level.R @ (current @ level.P)).sorted_indices()
+        level.R = level.P.T  # shares its memory; the sums of its products run in the same order as in rows
+        current = _sorted(csr_matrix(level.R.tocsr() @ (current @ level.P)))
     hierarchy = MultilevelSolver(levels, coarse_solver="splu")
     change_smoothers(hierarchy, ("gauss_seidel", {"sweep": "forward"}), ("gauss_seidel", {"sweep": "backward"}))
     return hierarchy
+
+
+def _sorted(matrix: csr_matrix) -> csr_matrix:
+    """The matrix itself where the columns of each row are in order, else a copy in order."""
+    return matrix if matrix.has_sorted_indices else matrix.sorted_indices()
 
 
 def _tentative(matrix: csr_matrix, near_kernel: Floats) -> tuple[csr_matrix, Floats]:
@@ -86,6 +91,8 @@ def _tentative(matrix: csr_matrix, near_kernel: Floats) -> tuple[csr_matrix, Flo
 def _smoothed(matrix: csr_matrix, tentative: csr_matrix) -> csr_matrix:
     """One damped Jacobi sweep on every column."""
     correction = csr_matrix(matrix @ tentative)
-    rows = np.asarray(abs(matrix).sum(axis=1)).ravel()
+    sizes = csr_matrix((np.abs(matrix.data), matrix.indices, matrix.indptr), matrix.shape, copy=False)
+    rows = np.asarray(sizes.sum(axis=1)).ravel()
+    del sizes
     correction.data *= np.repeat(DAMPING / rows, np.diff(correction.indptr))
     return csr_matrix(tentative - correction)

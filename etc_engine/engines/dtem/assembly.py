@@ -11,6 +11,9 @@ from scipy.sparse import csr_matrix
 
 from etc_engine.engines.dtem.element import Elements
 
+ROWS = 1 << 16
+"""Rows of a matrix that are compared at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
@@ -76,9 +79,13 @@ def assemble(elements: Elements, lift: NDArray[np.float64], prescribed: NDArray[
 
 def count_positive_off_diagonals(matrix: csr_matrix) -> int:
     """Off-diagonal entries above round-off of their diagonal; 0 for an M-matrix."""
-    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-    scale = matrix.diagonal()[rows]
-    return int(np.count_nonzero((matrix.indices != rows) & (matrix.data > 1e-12 * scale)))
+    diagonal, found = matrix.diagonal(), 0
+    for first in range(0, matrix.shape[0], ROWS):
+        ends = matrix.indptr[first : first + ROWS + 1]
+        rows = np.repeat(np.arange(first, first + ends.size - 1), np.diff(ends))
+        indices, data = matrix.indices[ends[0] : ends[-1]], matrix.data[ends[0] : ends[-1]]
+        found += int(np.count_nonzero((indices != rows) & (data > 1e-12 * diagonal[rows])))
+    return found
 
 
 @njit(cache=True)
