@@ -35,6 +35,7 @@ GRANULAR = (
     Model(
         "zehner_schluender",
         "Zehner-Schlünder (Schluender)",
+        "Zehner-Schlünder",
         granular.zehner_schluender,
         (3,),
         "estimate",
@@ -46,6 +47,7 @@ GRANULAR = (
     Model(
         "zbs_contact",
         "Zehner-Bauer-Schlünder (ZBS) with contact area",
+        "ZBS, contact area",
         granular.zbs_contact,
         (3,),
         "estimate",
@@ -61,6 +63,7 @@ GRANULAR = (
     Model(
         "kunii_smith",
         "Kunii-Smith",
+        "Kunii-Smith",
         granular.kunii_smith,
         (3,),
         "estimate",
@@ -72,6 +75,7 @@ GRANULAR = (
     Model(
         "yagi_kunii",
         "Yagi-Kunii (stagnant, no radiation)",
+        "Yagi-Kunii",
         granular.yagi_kunii,
         (3,),
         "estimate",
@@ -88,6 +92,7 @@ GRANULAR = (
     Model(
         "krupiczka",
         "Krupiczka",
+        "Krupiczka",
         granular.krupiczka,
         (3,),
         "estimate",
@@ -99,6 +104,7 @@ GRANULAR = (
     Model(
         "woodside_messmer",
         "Woodside-Messmer (three resistors)",
+        "Woodside-Messmer",
         granular.woodside_messmer,
         (3,),
         "estimate",
@@ -109,6 +115,7 @@ GRANULAR = (
     ),
     Model(
         "hadley",
+        "Hadley",
         "Hadley",
         granular.hadley,
         (3,),
@@ -121,6 +128,7 @@ GRANULAR = (
     Model(
         "batchelor_obrien",
         "Batchelor-O'Brien",
+        "Batchelor-O'Brien",
         granular.batchelor_obrien,
         (3,),
         "estimate",
@@ -132,6 +140,7 @@ GRANULAR = (
     Model(
         "zehner_bauer_schluender",
         "Zehner-Bauer-Schlünder (ZBS) with contact, rarefied gas and radiation",
+        "Zehner-Bauer-Schlünder",
         heated_beds.zehner_bauer_schluender,
         (3,),
         "estimate",
@@ -153,6 +162,7 @@ GRANULAR = (
     Model(
         "breitbach_barthels",
         "Breitbach-Barthels (radiation alone)",
+        "Breitbach-Barthels",
         heated_beds.breitbach_barthels,
         (3,),
         "estimate",
@@ -164,6 +174,7 @@ GRANULAR = (
     Model(
         "kunii_smith_radiation",
         "Kunii-Smith with radiation",
+        "Kunii-Smith, radiation",
         heated_beds.kunii_smith_radiation,
         (3,),
         "estimate",
@@ -175,6 +186,7 @@ GRANULAR = (
     Model(
         "hsu_cubes",
         "Hsu-Cheng-Wong, touching cubes",
+        "Hsu, cubes",
         heated_beds.hsu_cubes,
         (3,),
         "estimate",
@@ -186,6 +198,7 @@ GRANULAR = (
     Model(
         "hsu_square_cylinders",
         "Hsu-Cheng-Wong, touching square cylinders",
+        "Hsu, square cylinders",
         heated_beds.hsu_square_cylinders,
         (2,),
         "estimate",
@@ -196,6 +209,7 @@ GRANULAR = (
     ),
     Model(
         "hamilton_crosser",
+        "Hamilton-Crosser",
         "Hamilton-Crosser",
         heated_beds.hamilton_crosser,
         (3,),
@@ -211,6 +225,7 @@ NETWORKS = (
     Model(
         "contact_mean_field",
         "Contact mean field (affine temperature on the contact network)",
+        "contact mean field",
         networks.contact_mean_field,
         (2, 3),
         "estimate",
@@ -227,6 +242,7 @@ NETWORKS = (
     Model(
         "kirkpatrick",
         "Kirkpatrick network effective medium",
+        "Kirkpatrick network",
         networks.kirkpatrick,
         (2, 3),
         "estimate",
@@ -243,6 +259,7 @@ NETWORKS = (
     Model(
         "percolation_power_law",
         "Percolation power law",
+        "percolation power law",
         networks.percolation_power_law,
         (2, 3),
         "estimate",

@@ -42,6 +42,7 @@ BOUNDS = (
     Model(
         "series",
         "Series (Wiener lower bound)",
+        "series",
         bounds.series,
         (2, 3),
         "lower bound",
@@ -53,6 +54,7 @@ BOUNDS = (
     Model(
         "parallel",
         "Parallel (Wiener upper bound)",
+        "parallel",
         bounds.parallel,
         (2, 3),
         "upper bound",
@@ -64,6 +66,7 @@ BOUNDS = (
     Model(
         "hashin_shtrikman_lower",
         "Hashin-Shtrikman lower bound",
+        "Hashin-Shtrikman lower",
         bounds.hashin_shtrikman_lower,
         (2, 3),
         "lower bound",
@@ -75,6 +78,7 @@ BOUNDS = (
     Model(
         "hashin_shtrikman_upper",
         "Hashin-Shtrikman upper bound",
+        "Hashin-Shtrikman upper",
         bounds.hashin_shtrikman_upper,
         (2, 3),
         "upper bound",
@@ -86,6 +90,7 @@ BOUNDS = (
     Model(
         "three_point_lower",
         "Three-point lower bound",
+        "three-point lower",
         statistical.three_point_lower,
         (2, 3),
         "lower bound",
@@ -98,6 +103,7 @@ BOUNDS = (
     Model(
         "three_point_upper",
         "Three-point upper bound",
+        "three-point upper",
         statistical.three_point_upper,
         (2, 3),
         "upper bound",
@@ -113,6 +119,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "maxwell",
         "Maxwell",
+        "Maxwell",
         effective_media.maxwell,
         (2, 3),
         "estimate",
@@ -124,6 +131,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "maxwell_inverse",
         "Inverse Maxwell (Maxwell-Eucken with pores as inclusions)",
+        "inverse Maxwell",
         effective_media.maxwell_inverse,
         (2, 3),
         "estimate",
@@ -135,6 +143,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "effective_medium",
         "Effective medium (symmetric Bruggeman)",
+        "Bruggeman, symmetric",
         effective_media.effective_medium,
         (2, 3),
         "estimate",
@@ -147,6 +156,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "differential",
         "Differential medium (asymmetric Bruggeman)",
+        "Bruggeman, differential",
         effective_media.differential,
         (2, 3),
         "estimate",
@@ -158,6 +168,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "differential_inverse",
         "Inverse differential medium (pores as inclusions)",
+        "Bruggeman, pores in solid",
         effective_media.differential_inverse,
         (2, 3),
         "estimate",
@@ -169,6 +180,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "hasselman_johnson",
         "Hasselman-Johnson (interface resistance)",
+        "Hasselman-Johnson",
         effective_media.hasselman_johnson,
         (2, 3),
         "estimate",
@@ -184,6 +196,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "third_order",
         "Third-order approximation (Torquato)",
+        "third order (Torquato)",
         statistical.third_order,
         (2, 3),
         "estimate",
@@ -194,6 +207,7 @@ EFFECTIVE_MEDIA = (
     ),
     Model(
         "lewis_nielsen",
+        "Lewis-Nielsen",
         "Lewis-Nielsen",
         filled_polymers.lewis_nielsen,
         (2, 3),
@@ -214,6 +228,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "agari_uno",
         "Agari-Uno (geometric mean)",
+        "Agari-Uno",
         filled_polymers.agari_uno,
         (2, 3),
         "estimate",
@@ -231,6 +246,7 @@ EFFECTIVE_MEDIA = (
     Model(
         "russell",
         "Russell (cubes)",
+        "Russell",
         filled_polymers.russell,
         (3,),
         "estimate",
@@ -256,6 +272,7 @@ ARRAYS = (
     Model(
         "square_array",
         "Square array of disks",
+        "square array",
         arrays.square_array,
         (2,),
         "exact",
@@ -267,6 +284,7 @@ ARRAYS = (
     Model(
         "hexagonal_array",
         "Hexagonal array of disks",
+        "hexagonal array",
         arrays.hexagonal_array,
         (2,),
         "exact",
@@ -278,6 +296,7 @@ ARRAYS = (
     Model(
         "simple_cubic",
         "Simple cubic array of spheres",
+        "simple cubic array",
         arrays.simple_cubic,
         (3,),
         "exact",
@@ -289,6 +308,7 @@ ARRAYS = (
     Model(
         "bcc",
         "Body-centred cubic array of spheres",
+        "body-centred cubic",
         arrays.bcc,
         (3,),
         "exact",
@@ -300,6 +320,7 @@ ARRAYS = (
     Model(
         "fcc",
         "Face-centred cubic array of spheres",
+        "face-centred cubic",
         arrays.fcc,
         (3,),
         "exact",

@@ -88,6 +88,8 @@ class Model:
         The key in the catalogue.
     title : str
         What it is called in print.
+    label : str
+        Its name in a picture: the title in at most 25 letters.
     function : callable
         The formula, of numbers, ndarrays or DataArrays.
     dimensions : tuple of int
@@ -106,6 +108,7 @@ class Model:
 
     name: str
     title: str
+    label: str
     function: Callable[..., Values]
     dimensions: tuple[int, ...]
     kind: Kind

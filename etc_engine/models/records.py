@@ -23,6 +23,7 @@ def record(model: Model) -> dict[str, Any]:
     return {
         "model": model.name,
         "title": model.title,
+        "label": model.label,
         "dimensions": list(model.dimensions),
         "kind": model.kind,
         "inputs": [

@@ -69,7 +69,7 @@ def test_labels_of_models_overlap_neither_each_other_nor_the_edge(made_sweep):
     renderer = figure.canvas.get_renderer()
     labels = [child for axes in figure.axes for child in axes.get_children() if isinstance(child, Annotation)]
     assert {label.get_text() for label in labels} >= {
-        "HS upper",
+        "Hashin-Shtrikman upper",
         "inverse Maxwell",
         "parallel",
         "Bruggeman, pores in solid",

@@ -21,10 +21,17 @@ except ImportError as error:
 
 INK = "#222222"
 GREY = "#8a8a8a"
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f3c8d", "#4d4d4d")
-"""Okabe and Ito's palette, told apart by colour-blind readers too, and two more."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#b65c93", "#c58a00", "#3a93c9", "#7f3c8d", "#4d4d4d")
+"""Okabe and Ito's palette for colour-blind readers, darker for thin lines on white, and two more. The page has it."""
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+TEXT, SMALL = 9.0, 7.5
+"""Sizes of letters in points: titles, axes and ticks; legends and notes."""
+
+UP, DOWN = "\N{UPWARDS ARROW}", "\N{DOWNWARDS ARROW}"
+DOWN_MARK = "$\N{DOWNWARDS ARROW}$"
+"""What stands for a value outside the axis, in words and as a marker."""
 
 FORMATS = ("png", "pdf", "svg", "jpg")
 
@@ -39,7 +46,7 @@ def new_figure(width: float, height: float) -> Figure:
 def style(axes: Axes) -> None:
     """The look of all curves: ticks inwards, no frame at the top and right, a faint grid."""
     axes.spines[["top", "right"]].set_visible(False)
-    axes.tick_params(direction="in", which="both", labelsize=9)
+    axes.tick_params(direction="in", which="both", labelsize=TEXT)
     axes.grid(True, color="#e6e6e6", linewidth=0.6)
     axes.set_axisbelow(True)
 

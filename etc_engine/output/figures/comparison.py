@@ -13,7 +13,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, save, spread, style
+from etc_engine.models import CATALOGUE
+from etc_engine.output.figures.canvas import (
+    COLOURS,
+    DOWN,
+    DOWN_MARK,
+    GREY,
+    INK,
+    MARKERS,
+    SMALL,
+    TEXT,
+    UP,
+    new_figure,
+    save,
+    spread,
+    style,
+)
 from etc_engine.study.quantities import QUANTITIES, SWEPT, heading_of, word_of
 from etc_engine.sweep.table import MEASURES
 
@@ -33,21 +48,6 @@ DECADES = 1.3
 MOST_PANELS = 12
 
 BOUNDS_NOTE = "Hashin-Shtrikman bounds hold for overlapping particles"
-
-SHORT = {
-    "series": "series",
-    "parallel": "parallel",
-    "hashin_shtrikman_lower": "HS lower",
-    "hashin_shtrikman_upper": "HS upper",
-    "maxwell": "Maxwell",
-    "maxwell_inverse": "inverse Maxwell",
-    "effective_medium": "Bruggeman, symmetric",
-    "differential": "Bruggeman, differential",
-    "differential_inverse": "Bruggeman, pores in solid",
-    "third_order": "third order",
-    "lewis_nielsen": "Lewis-Nielsen",
-    "agari_uno": "Agari-Uno",
-}
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
             axes.set_xscale("log")
         _draw_simulation(axes, part, axis)
         _draw_models(axes, part, lines, axis)
-        axes.set_title(title, fontsize=9)
-        axes.set_xlabel(axis.label, fontsize=9)
+        axes.set_title(title, fontsize=TEXT)
+        axes.set_xlabel(axis.label, fontsize=TEXT)
     if not logarithmic:
         grid[0, 0].set_ylim(*_heights(comparison))
     for i, axes in enumerate(grid.flat):
@@ -107,26 +107,24 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
         if i + columns < len(panels):
             axes.set_xlabel("")
     for axes in grid[:, 0]:
-        axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
+        axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=TEXT)
     own = any(dim in _model_dims(comparison) for dim in axis.panels)  # otherwise the models are those of the whole row
     for i, (axes, (_, part)) in enumerate(zip(grid.flat, panels, strict=False)):
         if own or i == min(len(panels), (i // columns + 1) * columns) - 1:
             _label_models(axes, part, lines, axis)
     _legend(figure, panels[0][1], axis)
     hidden = f"\nThe first {len(panels)} of {len(every)} panels." if len(every) > len(panels) else ""
-    figure.supxlabel(_notes(comparison) + hidden, fontsize=7.5, color="#555555")
+    figure.supxlabel(_notes(comparison) + hidden, fontsize=SMALL, color="#555555")
     return figure
 
 
 def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
-    """Limits of the conductivity: from 0, or about the simulated values where the pores conduct too."""
-    if not comparison.attrs["pores_conduct"]:
-        return 0.0, None
-    names = ("conductivity_mean", "band_low", "band_high")
+    """Limits of the conductivity: from 0 or a lower interval, or about the simulated values with pores that conduct."""
+    names = ("conductivity_mean", "conductivity_ci_low", "conductivity_ci_high", "band_low", "band_high")
     values = np.concatenate([comparison[name].values.ravel() for name in names])
     values = values[np.isfinite(values)]
-    if values.size == 0:
-        return 0.0, None
+    if values.size == 0 or not comparison.attrs["pores_conduct"]:
+        return float(min(values.min(initial=0.0), 0.0)), None
     low, high = float(values.min()), float(values.max())
     margin = MARGIN * (high - low if high > low else abs(high) or 1.0)
     return low - margin, high + margin
@@ -207,7 +205,9 @@ def _draw_band(
     x, mean = line
     low, high = curve[f"{name}_low"].values, curve[f"{name}_high"].values
     if axes.get_yscale() == "log":
+        cut = (low <= 0.0) & (mean > 0.0)
         low = np.where(low > 0.0, low, 1e-2 * mean)
+        axes.plot(x[cut], low[cut], linestyle="none", marker=DOWN_MARK, color=colour, markersize=6, zorder=3)
     axes.fill_between(x, low, high, color=colour, alpha=alpha, linewidth=0.0)
     if x.size == 1:
         axes.errorbar(x, mean, [mean - low, high - mean], fmt="none", ecolor=colour, elinewidth=0.9, capsize=3)
@@ -241,13 +241,15 @@ def _draw_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: 
 
 
 def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
-    """Names at the right ends of the model lines, or where they leave the panel, moved apart."""
+    """Names at the right ends of the model lines, moved apart; an arrow and the value where the end is off the axis."""
     ends = []
     bottom, top = axes.get_ylim()
     for name, x, y in _lines(part, lines, axis):
-        shown = np.flatnonzero((y >= bottom) & (y <= top))
-        if shown.size:
-            ends.append((name, float(x[shown[-1]]), float(y[shown[-1]])))
+        known = np.flatnonzero(np.isfinite(y))
+        if known.size:
+            end = float(y[known[-1]])
+            arrow = "" if bottom <= end <= top else f" {UP if end > top else DOWN} {end:.3g}"
+            ends.append((CATALOGUE[name].label + arrow, float(x[known[-1]]), min(max(end, bottom), top)))
     if not ends:
         return
     axes.set_xlim(axes.get_xlim())  # the labels are placed in these limits
@@ -255,14 +257,14 @@ def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis:
     to_fraction = axes.transScale + axes.transLimits
     points = [to_fraction.transform((x, y)) for _, x, y in ends]
     heights = spread([float(p[1]) for p in points], 0.05, 0.0, 1.0)
-    for (name, _, _), point, height in zip(ends, points, heights, strict=True):
+    for (words, _, _), point, height in zip(ends, points, heights, strict=True):
         axes.annotate(
-            SHORT.get(name, name.replace("_", " ")),
+            words,
             xy=(float(point[0]), float(point[1])),
             xycoords="axes fraction",
             xytext=(1.03, height),
             textcoords="axes fraction",
-            fontsize=7.5,
+            fontsize=SMALL,
             color="#444444",
             va="center",
             annotation_clip=False,
@@ -282,8 +284,8 @@ def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
     figure.legend(
         handles=handles,
         title=title,
-        fontsize=8,
-        title_fontsize=8,
+        fontsize=SMALL,
+        title_fontsize=SMALL,
         frameon=False,
         loc="outside upper center",
         ncols=columns,
@@ -300,9 +302,8 @@ def _notes(comparison: xarray.Dataset) -> str:
     notes = [f"Bands: {100 * level:g} % Student-t interval of {mean}, {number} realizations."]
     if bool(comparison["method_error"].notnull().any()):
         notes.append("Wide pale bands add the estimated error of method and discretization.")
-    zero = [
-        SHORT.get(str(n), str(n)) for n in comparison["model"].values if str(n) not in _drawn(comparison) + [MEAN_FIELD]
-    ]
+    undrawn = [str(n) for n in comparison["model"].values if str(n) not in [*_drawn(comparison), MEAN_FIELD]]
+    zero = [CATALOGUE[name].label for name in undrawn]
     if zero and not comparison.attrs["pores_conduct"]:
         notes.append(f"0 with insulating pores, not drawn: {', '.join(zero)}.")
     if comparison.attrs["bounds_unbound"]:

@@ -1,0 +1,97 @@
+"""Pictures: models in words, nothing off the axis without an arrow, letters that can be read, one palette."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from matplotlib.text import Annotation, Text
+
+from etc_engine.comparison import evaluate_models, model_lines
+from etc_engine.models import CATALOGUE
+from etc_engine.output.figures import draw_comparison, png
+from etc_engine.output.figures.canvas import COLOURS, DOWN_MARK, UP
+from etc_engine.sweep.result_file import open_dataset
+
+ROOT = Path(__file__).parents[2]
+PEBBLES = ROOT / "studies" / "pebble_bed"
+STUDY = """
+schema = 2
+name = "made"
+seed = 20263
+[packing]
+radii = "uniform:0.01:0.02"
+box = [1.0, 1.0]
+density = [0.6, 0.65, 0.7, 0.75]
+[contacts]
+rule = "bonded"
+contact_angle = 5.0
+[pores]
+conductivity = 0.1
+[statistics]
+realizations = 3
+[models]
+names = ["maxwell", "parallel"]
+"""
+
+
+def smallest_letters(figure: Figure, width: float = 600.0) -> float:
+    """Size of the smallest letters in pixels where the figure is shown at a width in pixels."""
+    png(figure)
+    shown = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    return min(text.get_fontsize() for text in shown) / 72.0 * width / figure.get_figwidth()
+
+
+def test_every_model_has_a_short_name_in_words():
+    labels = [model.label for model in CATALOGUE.values()]
+    assert len(set(labels)) == len(labels) == 38
+    assert all(0 < len(label) <= 25 and "_" not in label for label in labels)
+
+
+def test_a_model_off_the_axis_has_an_arrow_with_its_value(made_sweep):
+    comparison = evaluate_models(made_sweep(STUDY, lambda f, *_: 0.1 + 0.1 * (f - 0.6)))
+    lines = model_lines(comparison)
+    figure = draw_comparison(comparison, lines)
+    end = float(lines["model_conductivity"].sel(model="parallel").isel(density=-1))
+    assert end > figure.axes[0].get_ylim()[1]
+    labels = [child.get_text() for child in figure.axes[0].get_children() if isinstance(child, Annotation)]
+    assert f"parallel {UP} {end:.3g}" in labels
+
+
+def test_intervals_lie_inside_the_axis_or_have_an_arrow(made_sweep):
+    text = STUDY.replace("[pores]\nconductivity = 0.1\n", "")
+    wide = evaluate_models(made_sweep(text, lambda f, _a, _m, i: f * (0.01 if i else 1.0)))
+    assert float(wide["conductivity_ci_low"].min()) < 0.0
+    axes = draw_comparison(wide, model_lines(wide)).axes[0]
+    assert axes.get_ylim()[0] <= float(wide["conductivity_ci_low"].min())
+    decades = evaluate_models(made_sweep(text, lambda f, _a, _m, i: 10.0 ** (20.0 * (f - 0.8)) * (0.01 if i else 1.0)))
+    axes = draw_comparison(decades, model_lines(decades)).axes[0]
+    arrows = [line for line in axes.get_lines() if line.get_marker() == DOWN_MARK]
+    assert axes.get_yscale() == "log"
+    assert sum(len(line.get_xdata()) for line in arrows) == 4
+
+
+def test_letters_of_the_readmes_pictures_can_be_read_at_600_pixels(made_sweep):
+    assert imread(ROOT / "studies" / "site" / "bed.png").shape[1] == 960  # drawn with letters of 24 pixels
+    assert 24 * 600 / 960 >= 9
+    spec = importlib.util.spec_from_file_location("pebble_bed_analyse", PEBBLES / "analyse.py")
+    study = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(study)
+    comparison = evaluate_models(open_dataset(PEBBLES / "sweep.nc"), [study.MODEL]).isel(density=0)
+    figure = study.draw(comparison, study.of_beds(str(PEBBLES / "poured.nc")))
+    assert smallest_letters(figure) >= 9.0
+    assert imread(PEBBLES / "figure.png").shape[1] == pytest.approx(200 * figure.get_figwidth(), abs=1)
+    compared = evaluate_models(made_sweep(STUDY, lambda f, *_: 0.1 * f))
+    assert smallest_letters(draw_comparison(compared, model_lines(compared))) >= 9.0
+
+
+def test_the_page_has_the_palette_of_the_figures():
+    script = (ROOT / "etc_engine" / "service" / "page" / "figure.js").read_text(encoding="utf-8")
+    listed = re.findall(r"#[0-9a-f]{6}", next(line for line in script.splitlines() if line.startswith("const COLOURS")))
+    assert len(listed) >= 6
+    assert np.array_equal(listed, COLOURS[: len(listed)])
