@@ -20,7 +20,12 @@ COLUMN = 18
 
 @click.command("compare")
 @click.argument("result", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Figure to write: .png, .pdf or .svg.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Figure to write: .png, .pdf or .svg. Replaces one that is there.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
     """Compare the sweep in RESULT (netCDF) with conductivity models.

@@ -14,6 +14,7 @@ import click
 from etc_engine.errors import EtcError, InputError
 
 if TYPE_CHECKING:
+    from etc_engine.cli.clock import Clock
     from etc_engine.cli.contact_options import ContactWords
     from etc_engine.cli.particle_options import SampleWords
     from etc_engine.cli.solve_request import SolveRequest
@@ -93,7 +94,7 @@ def _solve(
     from etc_engine.medium.conduction import Conduction
     from etc_engine.realization.distributed import check_distributed, read_scattered
 
-    start = time.perf_counter()
+    clock = Clock()
     asked = SolveRequest(**given)
     asked.refuse_words()
     unheeded = {"-o": output, "--vtk": vtk, "--plot": plot, "--full": full, "--contacts": dumped.contacts}
@@ -110,7 +111,7 @@ def _solve(
         for note in file.notes:
             click.echo(f"etc-engine: note: {note}", err=True)
     record = _record(ranks, asked, conduction, file, None if file.conductivity is not None else solid)
-    record["seconds"] = time.perf_counter() - start
+    record |= clock.record()
     if ranks.rank == 0:
         (print_json if as_json else print_table)(record)
     return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.clock import Clock
 from etc_engine.cli.image_options import ImageTask, ImageWords, image_options, write_image_result
 from etc_engine.cli.particle_options import SampleWords, parse_faces, particle_options, read_sample
 
@@ -76,7 +76,7 @@ def homogenize_command(
     Overlapping inclusions count as their union. Where their conductivities differ the radical plane divides them. A
     conductivity of 0 insulates, inf conducts perfectly.
     """
-    start = time.perf_counter()
+    clock = Clock()
     import numpy as np
 
     from etc_engine.cli.options import check_picture, check_place, print_json
@@ -92,7 +92,7 @@ def homogenize_command(
         record = _of_image(inclusions, words, image, plot, given)
         if output is not None:
             write_image_result(output, record)
-        record["seconds"] = time.perf_counter() - start
+        record |= clock.record()
         (print_json if as_json else _print_table)(record)
         return
     if given["matrix"] is None:
@@ -123,7 +123,7 @@ def homogenize_command(
         _write(files, output, table, medium, record)
         if plot is not None:
             _draw(files, plot, engine.section, (medium, method, options), record)
-    record["seconds"] = time.perf_counter() - start
+    record |= clock.record()
     if as_json:
         print_json(record)
     else:

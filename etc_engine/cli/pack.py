@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -67,6 +66,7 @@ def pack_command(
     """Make a random packing and write it to a file, in the format of its ending."""
     from numpy.random import SeedSequence, default_rng
 
+    from etc_engine.cli.clock import Clock
     from etc_engine.cli.options import check_picture, check_place, parse_box, print_json
     from etc_engine.cli.progress import PackingProgress
     from etc_engine.durable.files import replacing
@@ -97,10 +97,10 @@ def pack_command(
         check_picture(plot)
         check_place(plot)
     seed = int(SeedSequence().generate_state(1)[0]) if seed is None else seed
-    start = time.perf_counter()
+    clock = Clock()
     with PackingProgress() as progress:
         packing = pack(spec, default_rng(seed), progress.report)
-    seconds = time.perf_counter() - start
+    seconds = clock.record()
     contacts = neighbor_pairs(packing, relative_gap=bond_gap).count
     options = {
         "method": method,
@@ -127,7 +127,7 @@ def pack_command(
         "density": packing.density,
         "contacts": contacts,
         "coordination": 2.0 * contacts / packing.count,
-        "seconds": seconds,
+        **seconds,
         "seed": seed,
     }
     if method == "advancing-front" and density is not None:
@@ -136,7 +136,7 @@ def pack_command(
         print_json(record)
     else:
         for name, value in record.items():
-            text = f"{name:14s}{f'{value:.8g}' if isinstance(value, float) else value}"
+            text = f"{name:16s}{f'{value:.8g}' if isinstance(value, float) else value}"
             click.echo(text, err=output == STDOUT)
 
 

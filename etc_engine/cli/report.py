@@ -11,7 +11,13 @@ EXIT_BOUND_BROKEN = 3
 
 @click.command("report")
 @click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RESULT [RESULT ...]")
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="HTML file to write.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="HTML file to write. An existing page is replaced.",
+)
 def report_command(results: tuple[Path, ...], output: Path) -> int:
     """Write one self-contained page on the sweep in RESULT (netCDF).
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.clock import Clock
 from etc_engine.cli.contact_options import ContactWords, contact_options
 from etc_engine.cli.distributed import distributed_option
 from etc_engine.cli.particle_options import (
@@ -102,7 +102,7 @@ def solve_command(
 
     Along the load axis one wall is held at the temperature 1 and the other at 0, unless the box is periodic.
     """
-    start = time.perf_counter()
+    clock = Clock()
 
     from etc_engine.cli.options import print_json
     from etc_engine.errors import InputError
@@ -153,7 +153,7 @@ def solve_command(
         )
     if field is not None:
         write_outputs(outputs, field, record, table)
-    record["seconds"] = time.perf_counter() - start
+    record |= clock.record()
     if as_json:
         print_json(record)
     else:
