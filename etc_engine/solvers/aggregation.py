@@ -15,6 +15,10 @@ from etc_engine.arrays import Floats
 
 STRENGTH = 0.08
 """Entries below this part of the geometric mean of their diagonals do not aggregate."""
+WEAK = 0.02
+"""The same on coarse levels with more than ``DENSE`` entries a row, as of spheres: with 0.08 few entries of such a row
+count as strong, aggregates stay small, and the next level is nearly full."""
+DENSE = 40
 DAMPING = 4.0 / 3.0
 """Damping of the Jacobi sweep that smooths a prolongator, relative to the absolute row sum."""
 COARSEST = 500
@@ -57,7 +61,8 @@ def aggregation_hierarchy(matrix: csr_matrix) -> Any:
         levels.append(level)
         if current.shape[0] <= COARSEST or len(levels) == MOST_LEVELS:
             break
-        tentative, coarse_kernel = _tentative(current, near_kernel)
+        dense = len(levels) > 1 and current.nnz > DENSE * current.shape[0]
+        tentative, coarse_kernel = _tentative(current, near_kernel, WEAK if dense else STRENGTH)
         if tentative.shape[1] >= current.shape[0]:
             break  # nothing aggregates any more
         near_kernel = coarse_kernel
@@ -74,12 +79,12 @@ def _sorted(matrix: csr_matrix) -> csr_matrix:
     return matrix if matrix.has_sorted_indices else matrix.sorted_indices()
 
 
-def _tentative(matrix: csr_matrix, near_kernel: Floats) -> tuple[csr_matrix, Floats]:
+def _tentative(matrix: csr_matrix, near_kernel: Floats, strength: float) -> tuple[csr_matrix, Floats]:
     """Prolongator of orthonormal columns, one an aggregate, that carries the near kernel, and that of its level."""
     from pyamg.aggregation.aggregate import standard_aggregation
     from pyamg.strength import symmetric_strength_of_connection
 
-    aggregates = standard_aggregation(symmetric_strength_of_connection(matrix, theta=STRENGTH))[0].tocsr()
+    aggregates = standard_aggregation(symmetric_strength_of_connection(matrix, theta=strength))[0].tocsr()
     values = near_kernel[np.repeat(np.arange(matrix.shape[0]), np.diff(aggregates.indptr))]
     norms = np.sqrt(np.bincount(aggregates.indices, values**2, minlength=aggregates.shape[1]))
     tentative = csr_matrix(
