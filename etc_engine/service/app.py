@@ -290,6 +290,15 @@ async def study_report(request: Request, study: Id) -> FileResponse:
     return FileResponse(report, media_type="text/html", filename=f"{study}.html", headers=headers)
 
 
+@api.head("/studies/{study}/bed.png", include_in_schema=False)
+@api.get("/studies/{study}/bed.png", response_class=FileResponse)
+async def study_bed(request: Request, study: Id) -> FileResponse:
+    """The packing of the first realization as a picture; it is drawn when it is first asked for."""
+    await _require_result(request, study)
+    picture = await run_in_threadpool(_service(request).runner.bed, study)
+    return FileResponse(picture, media_type="image/png")
+
+
 @api.post("/solve", openapi_extra=PARTICLES_BODY)
 async def solve(
     request: Request,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
@@ -92,6 +93,21 @@ class Runner:
                     line, self.store.folder(study), REPORT_SECONDS, good=(0, 3)
                 )  # 3: a bound is broken, and shown
         return page
+
+    def bed(self, study: str) -> Path:
+        """The picture of the packing of a finished study, drawn when it is first asked for.
+
+        Raises
+        ------
+        InputError
+            If it cannot be drawn, for instance because the packings were read from files.
+        """
+        picture = self.store.bed(study)
+        with self._reports:
+            if not picture.exists():
+                line = [sys.executable, "-m", "etc_engine.service.bed", str(self.store.result(study)), str(picture)]
+                run_held(line, self.store.folder(study), Held(REPORT_SECONDS, self.settings.limits.memory_bytes))
+        return picture
 
     def _run(self, line: Sequence[str], folder: Path, seconds: float, good: Sequence[int] = (0,)) -> tuple[str, str]:
         """Output and errors of a command of the engine: see `run_held`."""

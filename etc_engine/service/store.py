@@ -6,7 +6,8 @@
     lock                     held by the running service (flock: gone with its process, however that ends)
     queue.sqlite             the queue
     scratch/                 uploads, emptied at every start
-    studies/<id>/            study.toml, log, result.nc (and its shards), report.html; a damaged result.damaged.nc
+    studies/<id>/            study.toml, log, result.nc (and its shards), report.html, bed.png;
+                             a damaged result.damaged.nc
 """
 
 from __future__ import annotations
@@ -74,6 +75,10 @@ class Store:
     def report(self, study: str) -> Path:
         """The report, once somebody has asked for it."""
         return self.folder(study) / "report.html"
+
+    def bed(self, study: str) -> Path:
+        """The picture of the packing, once somebody has asked for it."""
+        return self.folder(study) / "bed.png"
 
     def set_aside(self, study: str) -> None:
         """Keep a damaged result under another name, so that the study can be computed again."""

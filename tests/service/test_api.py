@@ -125,6 +125,16 @@ def test_the_report_is_a_page_that_may_run_nothing(real, finished):
     assert "sandbox" in headers["content-security-policy"]
 
 
+def test_the_packing_of_a_study_is_a_picture(real, finished):
+    pytest.importorskip("matplotlib")
+    for _ in range(2):  # drawn, then kept
+        status, headers, body = ask(f"{real.url}/api/studies/{finished['id']}/bed.png")
+        assert (status, headers["content-type"]) == (200, "image/png")
+        assert body.startswith(b"\x89PNG") and len(body) > 10_000
+    kept = real.data / "studies" / finished["id"] / "bed.png"
+    assert kept.read_bytes() == body
+
+
 @pytest.mark.parametrize(
     ("options", "arguments"),
     [

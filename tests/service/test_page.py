@@ -93,6 +93,20 @@ def test_a_study_is_built_runs_and_grows_in_the_figure(slow, browser):
     assert browser.complaints() == []
 
 
+def test_the_page_shows_the_packing_when_it_is_opened(tmp_path, browser):
+    pytest.importorskip("matplotlib")
+    with Service(tmp_path / "data") as real:
+        study = client.submit(real.server, STUDY)["id"]
+        client.wait(real.server, study, interval=0.1)
+        browser.open(real.url)
+        browser.run("location.hash = '#/study/' + arguments[0]", study)
+        packing = "[...document.querySelectorAll('details')].find(d => d.textContent.startsWith('Packing'))"
+        browser.until(f"return {packing} && !{packing}.hidden")
+        browser.run(f"{packing}.open = true")
+        browser.until(f"const image = {packing}.querySelector('img'); return image && image.naturalWidth > 300")
+        assert browser.complaints() == []
+
+
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (420, "dark")])
 def test_nothing_hangs_over_and_everything_has_a_name(slow, browser, width, scheme):
     """Also read by whoever does not see it: names of controls, and contrast of 4.5 (WCAG AA)."""

@@ -203,6 +203,7 @@ function study(id) {
   const bar = h("progress", { "aria-label": "progress" }), counts = h("p", { class: "faint" });
   const buttons = h("div", { class: "buttons" }), plot = h("figure"), table = h("div", { class: "wide" });
   const models = h("div"), log = h("pre", { tabindex: "0", "aria-label": "end of the log" });
+  const bed = h("details", { ontoggle: showBed }, h("summary", {}, "Packing"));
   const shown = new Set();
   let known = "", drawn = "", chosen = false, lagging = false, units = -1;
 
@@ -224,6 +225,13 @@ function study(id) {
         await ask(path, { method: "DELETE" });
         location.hash = "#/new";
       }) : null].filter(Boolean));
+  }
+  function showBed() { // drawn by the service when it is first asked for
+    if (!bed.open || bed.querySelector("img")) return;
+    const said = h("p", { class: "faint" }, "Drawing …");
+    bed.append(said, h("img", { src: `/api/studies/${id}/bed.png`, alt: "The packing of the first realization",
+      onload: () => said.replaceChildren("The first realization, made again from its random stream."),
+      onerror: event => { event.target.hidden = true; said.replaceChildren("This packing cannot be drawn: the report says why."); } }));
   }
   function drawFigure(curve) {
     if (!chosen && curve.models.length) {
@@ -281,6 +289,7 @@ function study(id) {
     state.className = `state ${found.state}`;
     reason.textContent = found.reason === found.state ? "" : found.reason;
     bar.hidden = found.state === "done";
+    bed.hidden = found.state !== "done";
     fillCounts(found);
     log.textContent = found.log || "nothing yet";
     fillButtons(found);
@@ -296,7 +305,7 @@ function study(id) {
     return found.state === "running" || found.state === "queued";
   }
   show(title, counts, bar, reason, buttons, plot, h("h3", {}, "Models beside it"), models,
-    h("details", {}, h("summary", {}, "Values"), table), h("details", {}, h("summary", {}, "Log"), log));
+    bed, h("details", {}, h("summary", {}, "Values"), table), h("details", {}, h("summary", {}, "Log"), log));
   view.poll = poll;
   return poll();
 }
