@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from etc_engine.cli.clock import Clock
 from etc_engine.errors import EtcError, InputError
 
 if TYPE_CHECKING:
-    from etc_engine.cli.clock import Clock
     from etc_engine.cli.contact_options import ContactWords
     from etc_engine.cli.particle_options import SampleWords
     from etc_engine.cli.solve_request import SolveRequest
