@@ -1,53 +1,73 @@
-"""The progress of a sweep: a bar on a terminal, a line a minute elsewhere; and of a packing: a bar on a terminal."""
+"""The progress of a sweep, shown by a process apart; and of a packing: a bar on a terminal."""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
 import sys
-import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack, suppress
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import click
 
-LINE_SECONDS = 60.0
+from etc_engine.cli.ticker import LINE_SECONDS
+
+END_SECONDS = 2.0
+"""What the last refreshment may take: a terminal that is stopped (Ctrl-S) holds up no result."""
 BAR_DELAY = 1.0
 """A packing that takes less than this many seconds shows no bar."""
 
 
 class Progress:
-    """Shows units done of units planned, rate, remaining time and failures on stderr.
+    """Shows units done of units planned, rate, remaining time and failures on stderr, also during a unit.
 
-    The rate counts from the first unit of this run: kernels are compiled before it, which no other unit waits for.
+    A process apart shows them, see ``ticker.py``: a compiled kernel holds the interpreter of this one. It starts with
+    the first report, which rank 0 alone makes, before its first unit. It ends with this process, however that ends.
     """
 
-    def __init__(self) -> None:
-        self._bar: Any = None
-        self._counted = self._told = time.monotonic()
-        self._first: int | None = None
+    def __init__(self, line_seconds: float = LINE_SECONDS) -> None:
+        self._line_seconds = line_seconds
+        self._ticker: subprocess.Popen[bytes] | None = None
+        self._held = ExitStack()
 
     def report(self, done: int, planned: int, failed: int) -> None:
-        """Take in the present state; shows it if it is time."""
-        if self._first is None:
-            self._first, self._counted = done, time.monotonic()
-        if sys.stderr.isatty():
-            self._show_bar(done, planned, failed)
-        elif time.monotonic() - self._told >= LINE_SECONDS:
-            self._told = time.monotonic()
-            click.echo(progress_line(done, planned, failed, done - self._first, self._told - self._counted), err=True)
+        """Take in the present state."""
+        if self._ticker is None:
+            self._start()
+        self._send({"done": done, "planned": planned, "failed": failed})
 
     def notify(self, text: str) -> None:
         """A remark of its own line."""
         click.echo(f"etc-engine: {text}", err=True)
 
-    def _show_bar(self, done: int, planned: int, failed: int) -> None:
-        if self._bar is None:
-            import tqdm
+    def _start(self) -> None:
+        script = Path(__file__).with_name("ticker.py")
+        line = [sys.executable, "-P", str(script), str(self._line_seconds)]
+        self._ticker = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+        assert self._ticker.stdin is not None
+        os.set_blocking(self._ticker.stdin.fileno(), False)
+        self._held.callback(self._end, self._ticker)
+        self._held.enter_context(_compilation(lambda now: self._send({"compiling": now})))
 
-            self._bar = tqdm.tqdm(total=planned, initial=done, unit="unit", dynamic_ncols=True, file=sys.stderr)
-        self._bar.total = planned
-        if failed:
-            self._bar.set_postfix_str(f"failed cells: {failed}", refresh=False)
-        self._bar.update(done - self._bar.n)
+    def _send(self, state: dict[str, int | bool]) -> None:
+        """Write one state, or drop it: nothing waits for a reader that is stopped or gone."""
+        if self._ticker is not None and self._ticker.stdin is not None:
+            with suppress(OSError):  # shorter than PIPE_BUF: written whole or not at all
+                os.write(self._ticker.stdin.fileno(), json.dumps(state).encode() + b"\n")
+
+    @staticmethod
+    def _end(ticker: subprocess.Popen[bytes]) -> None:
+        if ticker.stdin is not None:
+            ticker.stdin.close()
+        try:
+            ticker.wait(END_SECONDS)
+        except subprocess.TimeoutExpired:
+            ticker.kill()
+            ticker.wait()
 
     def __enter__(self) -> Progress:
         return self
@@ -55,8 +75,7 @@ class Progress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._bar is not None:
-            self._bar.close()
+        self._held.close()
 
 
 class PackingProgress:
@@ -89,14 +108,22 @@ class PackingProgress:
             self._bar.close()
 
 
-def progress_line(done: int, planned: int, failed: int, computed: int, seconds: float) -> str:
-    """One line for a log.
+def _compilation(tell: Callable[[bool], None]) -> AbstractContextManager[None]:
+    """Calls ``tell`` when compilation begins and ends; a kernel that the cache holds is not compiled."""
+    from numba.core import event  # takes long to import: --help does without
 
-    Examples
-    --------
-    >>> progress_line(30, 120, 1, 20, 40.0)
-    'etc-engine: 30/120 units, 0.5 units/s, 180 s to go, failed cells: 1'
-    """
-    rate = computed / seconds if seconds > 0.0 else 0.0
-    left = f"{(planned - done) / rate:.0f} s to go" if rate else "no estimate yet"
-    return f"etc-engine: {done}/{planned} units, {rate:.3g} units/s, {left}, failed cells: {failed}"
+    class Compilation(event.Listener):
+        depth = 0  # a kernel within a kernel is the same compilation
+
+        def on_start(self, event: Any) -> None:  # noqa: ARG002 - the signature of numba
+            self.depth += 1
+            if self.depth == 1:
+                tell(True)
+
+        def on_end(self, event: Any) -> None:  # noqa: ARG002 - the signature of numba
+            self.depth -= 1
+            if self.depth == 0:
+                tell(False)
+
+    installed: AbstractContextManager[None] = event.install_listener("numba:compile", Compilation())
+    return installed

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 Realize = Callable[[RealizationSpec, np.random.Generator], Realization]
 Report = Callable[[int, int, int], None]
-"""Called on rank 0 with units done, units planned and cells failed."""
+"""Called on rank 0 with units done, units planned and cells failed: before the first unit, and after each."""
 
 Notify = Callable[[str], None]
 """Called on rank 0 with a remark."""
@@ -213,6 +213,7 @@ def _units_to_run(claim: Claim, targets: tuple[int, ...], finished: Ints) -> Int
 
 def _run_round(round_: _Round, communicator: Communicator, realize: Realize, stop: StopRequest) -> str:
     """Compute the units of a round on all ranks; returns the reason if any of them stopped early."""
+    round_.tell(communicator)
     reason = _compute(round_, communicator, realize, stop)
     communicator.wait_for_all(lambda: round_.tell(communicator))
     reasons = communicator.gather(reason)
