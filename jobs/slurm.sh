@@ -12,12 +12,19 @@
 # job then queues itself again and continues; so it does when ranks were killed. Slurm itself queues it again after
 # the failure of a node and after a preemption.
 #
+# A third argument names a file for the exit status of the sweep, for a program that waits for the job.
+#
 # In a job array (sbatch --array=1-8 ...) each job computes its part of the units: see jobs/slurm_array.sh.
 set -uo pipefail
 
 study=${1:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
 output=${2:?usage: sbatch jobs/slurm.sh STUDY.toml OUTPUT.nc}
 restart=${SLURM_RESTART_COUNT:-0}
+ended=${3:-}
+if [ -n "$ended" ]; then
+    rm -f "$ended"
+    trap 'echo $? >"$ended.new" && mv "$ended.new" "$ended"' EXIT
+fi
 read -r -a launcher <<<"${ETC_LAUNCHER:-srun --kill-on-bad-exit=1}"
 part=()
 folder=$output.shards

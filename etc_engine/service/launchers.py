@@ -183,7 +183,8 @@ class SlurmLauncher:
         options = [f"--ntasks={self.settings.ranks}", f"--job-name={_job_name(study)}", f"--chdir={folder}"]
         options += [f"--output={self.store.log(study)}", *self.settings.sbatch]
         line = ["sbatch", "--parsable", *options, str(folder / "slurm.sh")]
-        line += [str(self.store.study_file(study)), str(self.store.result(study))]
+        line += [str(self.store.study_file(study)), str(self.store.result(study)), str(self._status_file(study))]
+        self._status_file(study).unlink(missing_ok=True)
         return self._ask(line).strip().splitlines()[-1].partition(";")[0]
 
     def find(self, study: str) -> str:
@@ -194,8 +195,11 @@ class SlurmLauncher:
                 return number
         return ""
 
-    def look(self, study: str, batch: str) -> Ended | None:  # noqa: ARG002 - the protocol's signature
-        """Slurm forgets a job some minutes after its end, and then calls its number invalid."""
+    def look(self, study: str, batch: str) -> Ended | None:
+        """Slurm forgets a job some minutes after its end, and then calls its number invalid.
+
+        The exit status comes from the script of the job: it is there without accounting, and however late one looks.
+        """
         if not batch:
             return Ended()
         try:
@@ -203,8 +207,8 @@ class SlurmLauncher:
         except UnreachableError:
             return None
         except OutputError as error:
-            return Ended() if "invalid job id" in str(error).lower() else None
-        return None if found.strip() else Ended()
+            return Ended(self._status(study)) if "invalid job id" in str(error).lower() else None
+        return None if found.strip() else Ended(self._status(study))
 
     def stop(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature
         """``scancel``: SIGTERM now, SIGKILL after the site's KillWait."""
@@ -218,6 +222,16 @@ class SlurmLauncher:
         if batch:
             with suppress(OutputError):
                 self._ask(["scancel", "--full", "--signal=KILL", batch])
+
+    def _status_file(self, study: str) -> Path:
+        return self.store.folder(study) / "status"
+
+    def _status(self, study: str) -> int | None:
+        """What the script wrote at its end; None if it was killed."""
+        try:
+            return int(self._status_file(study).read_text())
+        except (OSError, ValueError):
+            return None
 
     def _ask(self, line: Sequence[str]) -> str:
         """What a command of Slurm prints.

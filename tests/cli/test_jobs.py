@@ -139,6 +139,14 @@ def test_restarts_have_an_end(site, script, arguments, variables):
     assert len([call for call in calls if call.endswith("--resume")]) == 1
 
 
+@pytest.mark.parametrize("status", ["0", "2", "143"])
+def test_a_slurm_job_leaves_its_status_for_who_waits(site, status):
+    (site / "status").write_text("7\n")  # of an earlier job
+    words = {"STATUS": status, "SLURM_JOB_ID": "17", "ETC_MAX_RESTARTS": "0"}
+    ended, _, _ = run(site, "slurm.sh", "study.toml", "out.nc", "status", **words)
+    assert (ended, (site / "status").read_text()) == (int(status), f"{status}\n")
+
+
 @pytest.mark.parametrize("status", ["9", "15", "137", "139", "143"])
 def test_killed_ranks_queue_a_slurm_job_again(site, status):
     ended, calls, output = run(site, "slurm.sh", "study.toml", "out.nc", STATUS=status, SLURM_JOB_ID="17")

@@ -122,3 +122,16 @@ def test_what_sbatch_refuses_is_a_reason(slurm, service):
         study = client.submit(running.server, STUDY)["id"]
         ended = client.wait(running.server, study, interval=0.2)
     assert (ended["state"], "invalid partition" in ended["reason"]) == ("failed", True), ended
+
+
+def test_a_study_that_is_refused_is_tried_once(slurm, service, place):
+    """Every rank of the job ends with status 2; the first one to end must not make the others look killed."""
+    program = place / "bin" / "etc-engine"
+    program.write_text(program.read_text().replace('"$@"', 'sweep /nowhere/study.toml -o "$4" --resume'))
+    before = set(jobs(slurm))
+    with service() as running:
+        study = client.submit(running.server, STUDY)["id"]
+        ended = client.wait(running.server, study, interval=0.2)
+    assert ended["state"] == "failed", ended
+    assert "/nowhere/study.toml" in ended["reason"], ended
+    assert len(set(jobs(slurm)) - before) == 1, ended

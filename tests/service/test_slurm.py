@@ -85,7 +85,7 @@ def test_a_study_goes_through_sbatch_with_the_script_of_jobs(site):
         "--partition=short",
     ):
         assert word in call.split()
-    assert call.endswith(f"{folder}/slurm.sh {folder}/study.toml {folder}/result.nc")
+    assert call.endswith(f"{folder}/slurm.sh {folder}/study.toml {folder}/result.nc {folder}/status")
     assert open_dataset(folder / "result.nc").sizes["realization"] == 3
 
 
@@ -117,3 +117,14 @@ def test_a_silent_controller_is_waited_for_and_a_refusal_is_told(site):
         ended = client.wait(service.server, refused, interval=0.1)
         assert ended["state"] == "failed"
         assert "QOSMaxSubmitJobPerUserLimit" in ended["reason"]
+
+
+@pytest.mark.parametrize(("status", "starts"), [(2, 1), (1, 3)])
+def test_only_what_is_refused_is_not_tried_again(site, status, starts):
+    """Status 2 is the fault of the study; of another one nobody knows."""
+    (site / "bin" / "etc-engine").write_text(f"#!/bin/sh\necho 'etc-engine: no such bed'\nexit {status}\n")
+    with cluster(site) as service:
+        study = client.submit(service.server, STUDY)["id"]
+        ended = client.wait(service.server, study, interval=0.1)
+        assert (ended["state"], ended["reason"]) == ("failed", "no such bed"), ended
+    assert len(calls(site, "sbatch")) == starts
