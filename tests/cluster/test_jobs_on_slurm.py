@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -184,3 +185,25 @@ def test_an_array_is_joined_with_the_bits_of_one_run(slurm, place, slow, whole):
     assert finished(place) == UNITS
     assert differing_variables(open_dataset(output), whole) == []
     assert not list(place.glob("*.shards"))
+
+
+@pytest.mark.slow
+def test_a_node_set_down_hands_its_job_to_another(slurm, submit, place, whole):
+    """Slurm kills what runs there and queues the job again, which then waits two minutes: nothing hurries it.
+
+    Drained as well: the daemon of the node still runs, and brings it back from "down" by itself.
+    """
+    job = submit("--nodes=1", seconds=0.6)
+    until(lambda: finished(place) >= 3)
+    node = slurm.shown(job, "BatchHost")
+    try:
+        for state in ("DOWN", "DRAIN"):
+            slurm.ask("scontrol", "update", f"NodeName={node}", f"State={state}", "Reason=test")
+        until(lambda: slurm.shown(job, "Restarts") == "1")
+        assert slurm.wait(job, seconds=280.0) == "COMPLETED", log(place)
+        assert slurm.shown(job, "BatchHost") != node
+    finally:
+        slurm.ask("scontrol", "update", f"NodeName={node}", "State=RESUME")
+    assert re.search(rf"[3-{UNITS - 1}] of {UNITS} units are finished already", log(place)), log(place)
+    assert finished(place) <= UNITS + 2  # what two ranks had in hand
+    assert differing_variables(open_dataset(place / "out.nc"), whole) == []
