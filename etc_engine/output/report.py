@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from etc_engine.comparison.fits import Fit
 
+READABLE = 0.85
+"""Least width on a narrow screen over that of the picture: of 130 dots an inch, letters of 7 points are 10.7 pixels."""
 STYLE = """
 body { font: 15px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1d2430; background: #fff;
        max-width: 1080px; margin: 0 auto; padding: 24px 28px 64px; }
@@ -41,7 +43,8 @@ td.text, th.text { text-align: left; white-space: normal; overflow-wrap: break-w
 td.text:first-child { white-space: nowrap; }
 tr.broken td { background: #fde8e6; } .bad { color: #b42318; font-weight: 600; }
 img { max-width: 100%; min-width: 640px; height: auto; display: block; margin: 8px 0; }
-@media (max-width: 560px) { body { padding: 16px 14px 40px; } nav a { display: inline-block; padding: 4px 0; } }
+@media (max-width: 560px) { body { padding: 16px 14px 40px; } nav a { display: inline-block; padding: 4px 0; }
+       img { min-width: var(--readable); } }
 pre { background: #f4f6fa; padding: 12px; border-radius: 6px; overflow-x: auto; font-size: 13px; }
 @media print { nav { display: none; } h2 { break-after: avoid; } img, tr { break-inside: avoid; } }
 """
@@ -386,8 +389,10 @@ def _range(values: Sequence[int]) -> str:
 
 
 def _picture(png: bytes, description: str) -> str:
-    data = base64.b64encode(png).decode("ascii")
-    return f'<div class="wide"><img alt="{escape(description)}" src="data:image/png;base64,{data}"></div>\n'
+    data, width = base64.b64encode(png).decode("ascii"), int.from_bytes(png[16:20], "big")
+    style = f"--readable: {READABLE * width:.0f}px"
+    source = f"data:image/png;base64,{data}"
+    return f'<div class="wide"><img alt="{escape(description)}" style="{style}" src="{source}"></div>\n'
 
 
 def _table(

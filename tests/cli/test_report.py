@@ -154,7 +154,7 @@ def test_refusals_are_one_line_and_leave_nothing(result, tmp_path, monkeypatch, 
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
-@pytest.mark.parametrize("width", [1280, 700])
+@pytest.mark.parametrize("width", [1280, 700, 420])
 def test_a_browser_shows_every_picture_and_nothing_hangs_over(result, tmp_path, etc_engine, width):
     """A probe appended to a copy of the page says what the browser made of it."""
     page, probed = tmp_path / "report.html", tmp_path / "probed.html"
@@ -162,6 +162,7 @@ def test_a_browser_shows_every_picture_and_nothing_hangs_over(result, tmp_path, 
     probe = """<script>onload = () => { document.title = JSON.stringify({
         pictures: [...document.images].map(i => [i.complete, i.naturalWidth, i.getBoundingClientRect().width]),
         tables: [...document.querySelectorAll("table")].map(t => t.rows.length),
+        frames: [...document.images].map(i => i.parentElement.getBoundingClientRect().width),
         width: innerWidth, scroll: document.documentElement.scrollWidth}) }</script>"""
     probed.write_text(page.read_text(encoding="utf-8").replace("</body>", probe + "</body>"), encoding="utf-8")
     line = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"]
@@ -176,6 +177,11 @@ def test_a_browser_shows_every_picture_and_nothing_hangs_over(result, tmp_path, 
     for complete, natural, shown in seen["pictures"]:
         assert complete
         assert natural > 800
-        assert 300 < shown <= seen["width"]
+        if seen["width"] > 560:
+            assert 300 < shown <= seen["width"]
+        else:  # 130 dots an inch, letters of 7 points at least: they scroll in their frame
+            assert 130 * shown / natural * 7 / 72 > 10.5
+    assert max(seen["frames"]) <= seen["width"]
+    assert seen["width"] <= max(width, 500)  # Chromium without a screen has no narrower window
     assert min(seen["tables"]) >= 2
     assert seen["scroll"] <= seen["width"]
