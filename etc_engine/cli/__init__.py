@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import click
 
-from etc_engine.cli.streams import guarded_streams
+from etc_engine.cli.streams import PipeClosedError, guarded_streams
 from etc_engine.cli.threads import hold_one_thread
 from etc_engine.errors import EtcError
 
@@ -41,6 +41,7 @@ COMMANDS = {
 EXIT_DONE = 0
 EXIT_BUG = 1
 EXIT_REFUSED = 2
+EXIT_PIPE = 141  # what a shell reports of a process whose reader has left, such as `head`; silent
 EXIT_INTERRUPTED = 130  # what a shell reports of a process that Ctrl-C ended
 
 
@@ -119,7 +120,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except click.ClickException as error:
         return _refuse(error.format_message(), EXIT_REFUSED)
     except EtcError as error:
-        return _refuse(str(error), EXIT_REFUSED)
+        return EXIT_PIPE if isinstance(error, PipeClosedError) else _refuse(str(error), EXIT_REFUSED)
     except (click.Abort, KeyboardInterrupt):
         return _refuse("interrupted", EXIT_INTERRUPTED)
     except Exception as error:

@@ -74,7 +74,7 @@ def homogenize_command(
     raw). --phases gives the conductivities of an image.
 
     Overlapping inclusions count as their union. Where their conductivities differ the radical plane divides them. A
-    conductivity of 0 insulates, inf conducts perfectly.
+    conductivity of 0 is an insulator, inf a perfect conductor.
     """
     clock = Clock()
     import numpy as np

@@ -203,6 +203,7 @@ def _record(
         **({} if height is None else {"fill_height": height}),
         "pore_conductivity": medium.pores.conductivity,
         "contact_rule": network.rule,
+        **({"contact_resistance": asked.contact_resistance} if asked.contact_resistance else {}),
         **asked.physics.record,
         "contacts": int(np.count_nonzero(network.angles[:, 0])),
         "links": network.count,

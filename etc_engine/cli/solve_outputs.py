@@ -86,6 +86,8 @@ def write_outputs(outputs: SolveOutputs, field: ParticleField, record: dict[str,
 
 def print_table(record: dict[str, Any]) -> None:
     """Print a record, a line for each value."""
+    labels = {name: LABELS.get(name, name.replace("_", " ")) for name in record}
+    width = max(24, 1 + max(map(len, labels.values())))
     for name, value in record.items():
         if name in ("contact_temperatures", "status"):  # the name of the status is printed
             continue
@@ -98,5 +100,4 @@ def print_table(record: dict[str, Any]) -> None:
         else:
             text = f"{value:.8g}" if isinstance(value, float) else str(value)
         unit = " W/(m K)" if name.startswith("conductivity") else ""
-        label = LABELS.get(name, name.replace("_", " "))
-        click.echo(f"{label:24s}{text}{unit}")
+        click.echo(f"{labels[name]:{width}s}{text}{unit}")

@@ -11,6 +11,10 @@ from typing import Any, TextIO, cast
 from etc_engine.errors import OutputError
 
 
+class PipeClosedError(OutputError):
+    """Whoever read standard output has read enough, such as ``head``: no mistake."""
+
+
 class _Guarded:
     """A text stream whose failures raise `OutputError`, or are passed over where nothing depends on its text.
 
@@ -19,7 +23,7 @@ class _Guarded:
 
     def __init__(self, stream: TextIO | None, *, needed: bool) -> None:
         self._stream, self._needed = stream, needed
-        self._broken = "" if stream is not None else "it is closed"
+        self._broken, self._pipe = "" if stream is not None else "it is closed", False
 
     def write(self, text: str) -> int:
         return self._attempt(lambda stream: stream.write(text)) or len(text)
@@ -33,9 +37,10 @@ class _Guarded:
                 return action(self._stream)
             except OSError as error:
                 self._broken = error.strerror or str(error)
+                self._pipe = isinstance(error, BrokenPipeError)
                 _let_go(self._stream)
         if self._needed:
-            raise OutputError(
+            raise (PipeClosedError if self._pipe else OutputError)(
                 f"standard output cannot be written ({self._broken}): what this command prints is lost or cut short; "
                 "files that it has written are whole"
             )

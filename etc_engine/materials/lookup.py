@@ -56,7 +56,7 @@ def find_solid(name: str | Mapping[str, Any]) -> Solid:
         return CATALOGUE[known[wanted]]
     close = difflib.get_close_matches(wanted, known, n=3, cutoff=0.6)
     offers = list(dict.fromkeys(known[key] for key in close))
-    hint = f"did you mean {' or '.join(offers)}?" if offers else f"there are: {', '.join(CATALOGUE)}"
+    hint = f"did you mean {' or '.join(offers)}?" if offers else f"there are: {', '.join(CATALOGUE)}."
     raise InputError(
         f"there is no material named {name!r}; {hint} Or give a table: {{ temperature = [..], conductivity = [..] }}"
     )

@@ -13,7 +13,7 @@ from etc_engine.box import Box
 from etc_engine.errors import InputError
 from etc_engine.medium.local import LocalProperties
 from etc_engine.medium.network import LARGEST, ContactNetwork
-from etc_engine.medium.pores import VACUUM, Pores
+from etc_engine.medium.pores import VACUUM, Pores, check_conductivity
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.structure.union import solid_fraction
 
@@ -59,11 +59,8 @@ class Medium:
     def __post_init__(self) -> None:
         n = self.packing.count
         values = per_particle(self.conductivity, n, "conductivity")
-        if not (values >= 0.0).all():
-            raise InputError(
-                f"the conductivity of a particle must not be negative, found {values[~(values >= 0.0)][0]:g}: "
-                "0 insulates, inf conducts perfectly"
-            )
+        for value in (values.min(initial=np.inf), values.max(initial=0.0), values[values > 0.0].min(initial=np.inf)):
+            check_conductivity(float(value), "a particle")
         object.__setattr__(self, "conductivity", values)
         if self.heat_capacity is not None:
             stored = per_particle(self.heat_capacity, n, "heat capacity")

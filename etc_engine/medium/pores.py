@@ -8,6 +8,33 @@ import numpy as np
 
 from etc_engine.errors import InputError
 
+LARGEST, SMALLEST = 1e100, 1e-100
+"""No conductivity in SI units lies beyond these; products of three of them are still finite numbers."""
+
+
+def check_conductivity(value: float, whose: str, *, perfect: bool = True) -> None:
+    """Refuse a conductivity that is negative, no number, or beyond the range in which products are finite.
+
+    Parameters
+    ----------
+    value : float [W/(m K)]
+        0 is an insulator and infinity a perfect conductor.
+    whose : str
+        What has this conductivity, for the message.
+    perfect : bool, optional
+        Whether it may be infinite.
+
+    Raises
+    ------
+    InputError
+    """
+    if value == 0.0 or (perfect and value == np.inf) or SMALLEST <= value <= LARGEST:
+        return
+    others = "0 for an insulator, or inf for a perfect conductor" if perfect else "or 0 for an insulator"
+    raise InputError(
+        f"the conductivity of {whose} is {value:g}: give a number of W/(m K) from {SMALLEST:g} to {LARGEST:g}, {others}"
+    )
+
 
 @dataclass(frozen=True)
 class Pores:
@@ -49,6 +76,8 @@ class Pores:
         for name, value in values.items():
             if not (np.isfinite(value) and value >= 0.0):
                 raise InputError(f"the {name} of the pores must be finite and not negative, found {value:g}")
+
+        check_conductivity(self.conductivity, "the pores", perfect=False)
 
     @property
     def in_open_pores(self) -> float:

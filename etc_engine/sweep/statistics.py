@@ -95,7 +95,7 @@ def summarize(samples: Floats, confidence: float) -> Summary:
     return Summary(n, mean, std, sem, mean - width, mean + width)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Interval:
     """Mean over realizations with its confidence interval, and the two parts it is made of.
 
@@ -120,6 +120,11 @@ class Interval:
     percolating_mean: float
     percolating_low: float
     percolating_high: float
+
+    def __repr__(self) -> str:
+        """The mean with its bounds, and the fraction that percolates where it is not 1."""
+        part = "" if self.percolating_fraction == 1.0 else f", percolating {self.percolating_fraction:.4g}"
+        return f"Interval({self.mean:.6g} [{self.low:.6g}, {self.high:.6g}]{part})"
 
     @property
     def half_width(self) -> float:

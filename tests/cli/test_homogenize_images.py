@@ -54,6 +54,10 @@ def test_two_phases_by_matrix_and_inclusion(etc_engine, tmp_path):
     [
         ((), "the image has the labels 0, 1, 7: give the conductivity of each, such as --phases 0=1,1=1,7=1"),
         (("--phases", "0=1,1=2"), "the conductivity of 7 is missing"),
+        (("--phases", "0=1"), "the conductivity of 1, 7 is missing"),
+        (("--phases", "0=1,1=2,7=3,8=1,12=5"), "the labels 0, 1, 7, but conductivities are given for 8, 12 too"),
+        (("--phases", "0=1,1=2,7=nan"), "the conductivity of label 7 is nan: give a number"),
+        (("--phases", "0=1,1=2,7=1e300"), "from 1e-100 to 1e+100"),
         (("--phases", "0:1"), "LABEL=CONDUCTIVITY"),
         ((*PHASES, "--matrix", 1), "give one of them"),
         ((*PHASES, "--engine", "lattice"), "solved by --engine voxel"),

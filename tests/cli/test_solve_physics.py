@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from etc_engine.cli import run
+from etc_engine.cli.solve_outputs import print_table
 from etc_engine.realization import find_engine
 
 pytest.importorskip("CoolProp")
@@ -178,3 +179,15 @@ def test_walls_of_two_temperatures(tmp_path, capfd):
 def test_what_walls_need(bed, capfd, extra, message):
     assert run(["solve", *bed, *extra]) == 2
     assert message in capfd.readouterr().err
+
+
+def test_the_text_separates_every_name_from_its_value(bed, capfd):
+    assert run(["solve", *bed, "--contact-resistance", "0.1"]) == 0
+    assert "\ncontact resistance      0.1\n" in capfd.readouterr().out
+    assert solved(capfd, *bed, "--contact-resistance", "0.1")["contact_resistance"] == 0.1
+    assert "contact_resistance" not in solved(capfd, *bed)
+    print_table({"conductivity_between_walls_per_axis": {"x": 1.0}, "particles": 3})
+    assert capfd.readouterr().out.splitlines() == [
+        "conductivity between walls per axis x 1 W/(m K)",
+        "particles                           3",
+    ]

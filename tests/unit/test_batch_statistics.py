@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from etc_engine.sweep.statistics import student_t, summarize
+from etc_engine.sweep.statistics import interval, student_t, summarize
 
 
 @pytest.mark.parametrize(
@@ -57,3 +57,10 @@ def test_the_interval_covers_as_often_as_it_says(count):
     summary = summarize(rng.normal(5.0, 2.0, (count, 20000)), 0.9)
     covered = np.mean((summary.ci_low <= 5.0) & (summary.ci_high >= 5.0))
     assert covered == pytest.approx(0.9, abs=0.01)
+
+
+def test_an_interval_is_shown_in_one_short_line():
+    shown = repr(interval(np.array([0.0, 1.0, 2.0, 3.0])))
+    assert shown.startswith("Interval(1.5 [")
+    assert "percolating 0.75" in shown
+    assert len(shown) < 80

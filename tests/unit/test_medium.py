@@ -55,7 +55,7 @@ def test_an_area_resistance_is_over_the_area_of_each_contact(d, area):
         (lambda n: n.with_resistance([1.0]), r"shape \(24,\), found \(1,\)"),
         (lambda n: n.with_area_resistance(np.nan), "must be >= 0 and finite, found nan"),
         (lambda n: medium_of(n, [1.0, 2.0]), r"the conductivity must be one number or an array of shape \(9,\)"),
-        (lambda n: medium_of(n, -1.0), "must not be negative, found -1"),
+        (lambda n: medium_of(n, -1.0), "is -1: give a number"),
         (lambda n: medium_of(n, heat_capacity=0.0), "the heat capacity must be positive and finite, found 0"),
         (lambda n: Medium(crystal(2), np.ones(9), n), "must be of the packing of the medium"),
         (lambda _: Pores(-0.1), "conductivity of the pores must be finite and not negative"),
@@ -170,3 +170,12 @@ def test_questions_an_engine_cannot_answer_are_refused():
     with pytest.raises(InputError, match="the conductivity along y was not asked for"):
         field_along(disks, result, engine="dtem", method="chord", axis=1)
     assert field_along(disks, result, engine="dtem", method="chord").axis == 0
+
+
+@pytest.mark.parametrize("value", [1e300, 1e-300, -1.0, np.nan, np.inf])
+def test_a_conductivity_whose_products_overflow_is_refused_in_words(value):
+    with pytest.raises(InputError, match="the pores"):
+        Pores(value)
+    if value != np.inf:
+        with pytest.raises(InputError, match=r"from 1e-100 to 1e\+100, 0 for an insulator, or inf"):
+            Medium(ParticlePacking([[0.5, 0.5]], [0.2], Box((1.0, 1.0))), value)

@@ -84,7 +84,7 @@ def test_insulators_are_checked_on_a_finer_grid():
 def test_phases_without_a_conductivity_are_named():
     with pytest.raises(InputError, match="labels 0, 3: the conductivity of 3 is missing"):
         homogenize_image(np.array([[0, 3]]), {0: 1.0}, (1.0, 1.0))
-    with pytest.raises(InputError, match="label 3 must not be negative"):
+    with pytest.raises(InputError, match="label 3 is -1: give a number"):
         homogenize_image(np.array([[0, 3]]), {0: 1.0, 3: -1.0}, (1.0, 1.0))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from etc_engine.arrays import Floats, Ints
 from etc_engine.engines.voxel.cell import CellSolution, Scheme, solve_cell
 from etc_engine.errors import ConvergenceError, InputError
+from etc_engine.medium.pores import check_conductivity
 
 LARGEST_REFINED = 8_000_000
 """Most voxels of the refined image from which the error is estimated."""
@@ -33,7 +34,8 @@ def image_conductivity(labels: Ints, phases: Mapping[int, float]) -> Floats:
     Raises
     ------
     InputError
-        If a label has no conductivity, or a conductivity is negative or no number.
+        If a label has no conductivity, or a conductivity is given for a label that the image does not hold, is
+        negative or no number.
 
     Examples
     --------
@@ -44,12 +46,17 @@ def image_conductivity(labels: Ints, phases: Mapping[int, float]) -> Floats:
     missing = [int(label) for label in found if int(label) not in phases]
     if missing:
         raise InputError(
-            f"the image has the labels {', '.join(map(str, found.tolist()))}: the conductivity of {missing[0]} is "
-            "missing"
+            f"the image has the labels {', '.join(map(str, found.tolist()))}: the conductivity of "
+            f"{', '.join(map(str, missing))} is missing"
+        )
+    unknown = sorted(set(phases) - set(found.tolist()))
+    if unknown:
+        raise InputError(
+            f"the image has the labels {', '.join(map(str, found.tolist()))}, but conductivities are given for "
+            f"{', '.join(map(str, unknown))} too: leave those out, or see whether this is the right image"
         )
     for label, value in phases.items():
-        if not value >= 0.0:
-            raise InputError(f"the conductivity of label {label} must not be negative, found {value:g}")
+        check_conductivity(value, f"label {label}")
     values = np.array([phases[int(label)] for label in found])
     return np.asarray(values[np.searchsorted(found, labels)])
 
