@@ -31,6 +31,7 @@ COMMANDS = {
     "models": "etc_engine.cli.models:models_command",
     "export": "etc_engine.cli.export:export_command",
     "materials": "etc_engine.cli.materials:materials_command",
+    "keys": "etc_engine.cli.keys:keys_command",
     "transient": "etc_engine.cli.transient:transient_command",
     "serve": "etc_engine.cli.serve:serve_command",
     "submit": "etc_engine.cli.submit:submit_command",

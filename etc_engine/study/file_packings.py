@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -93,6 +93,8 @@ class FileParticlesTable(ParticlesTable):
 
 class FileStudy(Study):
     """A sweep over packings in files."""
+
+    KIND: ClassVar[str] = "files"
 
     packing: FilesTable = Field(description="a table")  # type: ignore[assignment]
     particles: FileParticlesTable = Field(default_factory=FileParticlesTable, description="a table")

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeVar
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
 from etc_engine.errors import StudyError
-from etc_engine.study.schema import StudyTable, Word, first_problem
+from etc_engine.study.schema import StudyTable, Word, first_problem, table_in
 
 SCHEMA = 2
 LONGEST_NAME = 80
@@ -75,6 +75,8 @@ A_SEED = "a whole number from 0 to 2**63 - 1"
 class StudyFile(StudyTable):
     """What every study file has."""
 
+    KIND: ClassVar[str] = "sweep"
+    """Word of ``etc-engine keys --study`` for this kind of file."""
     WITHOUT_EFFECT: ClassVar[tuple[str, ...]] = ("name",)
     """Keys that change no number of the result."""
 
@@ -172,7 +174,17 @@ def validated(content: Mapping[str, Any], kind: type[S], source: str = "study") 
     try:
         return kind.model_validate(dict(content))
     except ValidationError as error:
-        raise StudyError(f"{source}: {first_problem(error, kind, MOVED)}") from None
+        problem = first_problem(error, kind, MOVED)
+        raise StudyError(f"{source}: {problem}{_where_keys_stand(problem, kind)}") from None
+
+
+def _where_keys_stand(problem: str, kind: type[StudyFile]) -> str:
+    """The command that prints the keys of the section that a problem begins with; nothing of a key at the top."""
+    tables = {name for name, field in kind.model_fields.items() if table_in(field.annotation) is not None}
+    section = re.split(r"\W", problem, maxsplit=1)[0]
+    if section not in tables:
+        return ""
+    return f"; see: etc-engine keys {section}" + (f" --study {kind.KIND}" if kind.KIND != "sweep" else "")
 
 
 def _translation(content: Mapping[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -100,6 +100,8 @@ class Solver(StudyTable):
 
 class MeshlessStudy(StudyFile):
     """A transient study of kind "meshless"."""
+
+    KIND: ClassVar[str] = "meshless"
 
     kind: Literal["meshless"] = Field(description="meshless")
     body: Body = Field(description="a table of shape and material")

@@ -134,7 +134,7 @@ def _field(root: type[BaseModel], location: Sequence[int | str]) -> tuple[str, t
         if arm is not None:  # which of the ways to write a value, no key
             inside = arm
             continue
-        inner = _table_in(inside)
+        inner = table_in(inside)
         if inner is None:
             continue
         table = inner
@@ -158,8 +158,8 @@ def _tagged(annotation: Any, tag: str) -> Any:
     return None
 
 
-def _table_in(annotation: Any) -> type[BaseModel] | None:
+def table_in(annotation: Any) -> type[BaseModel] | None:
     """The table that a field holds, or may hold, or holds a list of."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((table for kind in get_args(annotation) if (table := _table_in(kind)) is not None), None)
+    return next((table for kind in get_args(annotation) if (table := table_in(kind)) is not None), None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -269,6 +269,8 @@ class Motion(StudyTable):
 
 class NetworkStudy(StudyFile):
     """A transient study of kind "network"."""
+
+    KIND: ClassVar[str] = "transient"
 
     kind: Literal["network"] = Field(description="network")
     seed: Seed | None = Field(default=None, description=f"{A_SEED}, if particles are packed")
