@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from etc_engine.durable.lock import Holder, alive, read_holder
 from etc_engine.durable.provenance import peak_bytes
-from etc_engine.errors import EtcError, PackingError, StudyError
+from etc_engine.errors import EtcError, OutputError, PackingError, StudyError
 from etc_engine.realization import Status
 from etc_engine.study.sweep import Study, read_study
-from etc_engine.sweep.claim import difference
+from etc_engine.sweep.claim import difference, recorded_runs
 from etc_engine.sweep.dataset import assemble
 from etc_engine.sweep.plan import Unit, units_to_run
 from etc_engine.sweep.records import Record, encode
@@ -143,6 +143,10 @@ def _in_shards(study: Study, folder: Path) -> tuple[str, set[tuple[int, int]]]:
     if found is None or found[0] != study.digest():
         what = f" ({difference(found[1], study.identity())})" if found else ""
         return f"shards of another study{what}: --resume is refused, --overwrite starts anew", set()
+    try:
+        recorded_runs(folder)
+    except OutputError as error:
+        return f"shards whose --resume is refused: {error}", set()
     reader = ShardReader(folder)
     records = reader.read(reader.files())
     done = {(study.densities.index(record.unit.density), record.unit.realization) for record in records}

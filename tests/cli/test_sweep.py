@@ -302,3 +302,16 @@ def test_units_of_another_version_are_told_on_resume(stand_in, study, tmp_path):
     assert resumed.returncode == 0
     assert "finished units come from etc_engine 0.0.1 then" in resumed.stderr
     assert len(json.loads(open_dataset(output).attrs["runs"])) == 2
+
+
+def test_a_dry_run_says_of_a_damaged_record_what_the_run_says(etc_engine, stand_in, study, tmp_path):
+    output = tmp_path / "out.nc"
+    interrupted(study, output, tmp_path / "log", signal.SIGTERM)
+    (run,) = output.with_name("out.nc.shards").glob("*.run")
+    run.write_bytes(run.read_bytes()[:-40])
+    dry = etc_engine("sweep", study, "-o", output, "--dry-run")
+    assert (dry.returncode, run.exists()) == (0, True)
+    assert "found     shards whose --resume is refused:" in dry.stdout
+    refused = etc_engine("sweep", study, "-o", output, "--resume")
+    assert refused.returncode == 2
+    assert refused.stderr.strip().removeprefix("etc-engine: ") in dry.stdout

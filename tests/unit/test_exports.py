@@ -125,6 +125,14 @@ def test_the_error_of_the_method_is_named_beside_the_intervals():
     assert "# Estimated error of the method, not in the intervals: up to 4.3 %.\n" in text
 
 
+def test_intervals_below_zero_are_counted_in_words():
+    assert "below 0" not in EXPORTS["csv"](*curves_of(sweep(), {}))
+    data = sweep(pressures=PRESSURE[:1], temperatures=TEMPERATURE[:1], realizations=2, scatter=0.0)
+    data["conductivity"] *= np.array([0.1, 1.9])[:, None, None]
+    for form, write in EXPORTS.items():
+        assert "below 0: 1. Student's interval is symmetric" in write(*curves_of(data, {})), form
+
+
 def test_csv_takes_units_from_the_result():
     """Every dimension with a unit has it in the header, whether it is varied or fixed."""
     resistance = QUANTITIES["contact_resistance"].attributes(2)

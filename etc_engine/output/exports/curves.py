@@ -63,6 +63,8 @@ class Source:
         Of the coordinates that have a dimension, in the spelling of CF.
     method_error : float
         Largest estimated relative error of the method, which the intervals do not hold; NaN if there is none.
+    below_zero : int
+        Number of intervals that reach below 0. Student's interval is symmetric about the mean.
     """
 
     study: str
@@ -70,6 +72,7 @@ class Source:
     attributes: Mapping[str, Any]
     units: Mapping[str, str]
     method_error: float = np.nan
+    below_zero: int = 0
 
     @property
     def lines(self) -> list[str]:
@@ -81,6 +84,11 @@ class Source:
         if np.isfinite(self.method_error):
             text.append(
                 f"Estimated error of the method, not in the intervals: up to {100.0 * self.method_error:.2g} %."
+            )
+        if self.below_zero:
+            text.append(
+                f"Intervals that reach below 0: {self.below_zero}. Student's interval is symmetric; no conductivity is "
+                "negative, so read these lower limits as 0, or run more realizations."
             )
         for key in ("source", "commit", "study_digest"):
             if self.attributes.get(key):
@@ -123,7 +131,8 @@ def curves_of(dataset: xarray.Dataset, at: Mapping[str, str]) -> tuple[list[Curv
     with_units = {name: unit for name, unit in units.items() if unit != "1"}
     k = values["conductivity_mean"]
     error = float((values["method_error"] / k.where(k > 0.0)).max())
-    return curves, Source(str(study.get("name", "")), confidence, dict(dataset.attrs), with_units, error)
+    below = sum(int((curve.conductivity < curve.half_width).sum()) for curve in curves)
+    return curves, Source(str(study.get("name", "")), confidence, dict(dataset.attrs), with_units, error, below)
 
 
 def _curve(cell: xarray.Dataset, fixed: Mapping[str, Any]) -> Curve:
