@@ -159,8 +159,10 @@ class Engine:
         row = self.find_method(method)
         if medium.dimension not in row.dimensions:
             works = " and ".join(f"{d}D" for d in row.dimensions)
+            able = [name for name, other in self.methods.items() if medium.dimension in other.dimensions]
+            cure = f"; its methods there are {', '.join(able)}" if able else ""
             raise InputError(
-                f"method {method} of engine {self.name} works in {works}, found a medium in {medium.dimension}D"
+                f"method {method} of engine {self.name} works in {works}, found a medium in {medium.dimension}D{cure}"
             )
         if row.contacts and medium.network is None:
             raise InputError(f"engine {self.name} needs contacts: give the medium a contact network")

@@ -104,6 +104,11 @@ def load_netcdf(path: Path) -> xarray.Dataset:
     import xarray
 
     trouble = why_unreadable(path, NETCDF)
+    if trouble and _is_something_else(path):
+        raise OutputError(
+            f"cannot read {path}: it is no netCDF file; expected a result of this engine, such as `etc-engine sweep "
+            "STUDY.toml -o out.nc` writes; `etc-engine info` says what particle files hold"
+        )
     if trouble:
         raise OutputError(f"cannot read {path}: {trouble}")
     try:
@@ -120,6 +125,16 @@ def load_netcdf(path: Path) -> xarray.Dataset:
             "the study again"
         )
     return dataset
+
+
+def _is_something_else(path: Path) -> bool:
+    """Whether a file that is not empty begins like no netCDF file."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(4)
+    except OSError:
+        return False
+    return bool(start) and not start.startswith((b"\x89HDF", b"CDF"))
 
 
 def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:

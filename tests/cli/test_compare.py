@@ -180,3 +180,12 @@ def test_compare_and_report_never_replace_their_input(etc_engine, tmp_path):
         done = etc_engine(command, path, "-o", path)
         assert done.returncode == 2
         assert "is the input itself" in done.stderr
+
+
+@pytest.mark.parametrize("words", [("compare",), ("report", "-o", "r.html"), ("export", "--to", "csv")])
+def test_a_table_of_text_is_no_result(etc_engine, tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.csv").write_text("x,y\n1,2\n")
+    done = etc_engine(words[0], "two.csv", *words[1:])
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "two.csv: it is no netCDF file; expected a result of this engine" in done.stderr
