@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,8 @@ class SolveRequest:
                     "--bond-gap is only valid with --contact-angle, which is missing: overlaps have no gap"
                 )
             raise InputError(f"--bond-gap has no effect with the contact rule {self.rule}: leave it out")
+        if self.physics.temperature is not None and not 0.0 < self.physics.temperature < inf:
+            raise InputError(f"--temperature is a positive number of kelvins, found {self.physics.temperature:g}")
         self.physics.refuse_two_resistances(self.contact_resistance)
         if fields and self.physics.walls is not None:
             raise InputError(

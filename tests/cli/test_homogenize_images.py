@@ -63,6 +63,7 @@ def test_two_phases_by_matrix_and_inclusion(etc_engine, tmp_path):
         ((*PHASES, "--engine", "lattice"), "solved by --engine voxel"),
         ((*PHASES, "--resolution", 32), "--resolution is not valid with a voxel image"),
         ((*PHASES, "--box", "1,1"), "--box needs 3 edge lengths"),
+        ((*PHASES, "--box", "1e300,1,1e-300"), "1e+12 times the shortest"),
         ((*PHASES, "--shape", "a,b"), "two or three numbers of voxels"),
     ],
 )
@@ -78,3 +79,17 @@ def test_phases_are_for_images(etc_engine, tmp_path):
     done = etc_engine("homogenize", tmp_path / "a.csv", "--box", "1,1", *PHASES)
     assert "--phases is only valid with voxel images" in done.stderr
     assert "--matrix is missing" in etc_engine("homogenize", tmp_path / "a.csv", "--box", "1,1").stderr
+
+
+def test_a_flat_cell_reaches_its_limit(etc_engine, tmp_path):
+    """Beyond some flatness the conductivity does not depend on it."""
+    labels = np.zeros((8, 8), dtype=np.uint8)
+    labels[2:6, 3:5] = 1
+    np.save(tmp_path / "a.npy", labels)
+    found = [
+        json.loads(
+            etc_engine("homogenize", tmp_path / "a.npy", "--phases", "0=1,1=2", "--box", f"{r},1", "--json").stdout
+        )["conductivity_tensor"][0][0]
+        for r in ("1e6", "1e9", "1e12")
+    ]
+    assert found == pytest.approx([found[0]] * 3, rel=1e-7)

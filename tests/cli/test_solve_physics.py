@@ -130,6 +130,8 @@ def test_the_help_names_every_method(capfd):
         (["--gas", "helium", "--pressure", "1e5", "--temperature", "300", "--pore-conductivity", "1"], "leave one"),
         (["--pressure", "1e5"], "a pressure needs a gas"),
         (["--emissivity", "0.8"], "needs a temperature"),
+        (["--temperature", "-5"], "--temperature is a positive number of kelvins, found -5"),
+        (["--temperature", "nan"], "--temperature is a positive number of kelvins, found nan"),
         (["--material", "copper"], "needs --temperature"),
         (["--material", "copper", "--temperature", "300", "--conductivity", "5"], "leave one of them out"),
     ],

@@ -163,11 +163,20 @@ def solve_cell(
     return CellSolution(tensor, max(load.iterations for load in loads), max(load.error for load in loads), kept)
 
 
+LONGEST_EDGE = 1e12
+"""Times the shortest edge. The limit of flat cells is reached long before; squares of more would overflow."""
+
+
 def _check_numbers(d: int, lengths: Sequence[float], scheme: Scheme, axes: tuple[int, ...] | None) -> None:
     tolerance, threads, limit = scheme.tolerance, scheme.threads, scheme.limit
     numbers = all(isinstance(x, (int, float, np.number)) and np.isfinite(float(x)) and x > 0.0 for x in lengths)
     if len(lengths) != d or not numbers:
         raise InputError(f"an image of {d} axes needs as many positive edge lengths, found {tuple(lengths)}")
+    if max(lengths) > LONGEST_EDGE * min(lengths):
+        raise InputError(
+            f"the longest edge of an image may be {LONGEST_EDGE:g} times the shortest, found {tuple(lengths)}: see "
+            "whether all of them are in the same unit"
+        )
     if not isinstance(tolerance, (int, float, np.number)) or not 0.0 < tolerance < 1.0:
         raise InputError(f"the tolerance must lie between 0 and 1, found {tolerance!r}")
     if not isinstance(threads, (int, np.integer)) or threads < 1:
