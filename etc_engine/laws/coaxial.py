@@ -86,7 +86,7 @@ def coaxial_column(
     table: Floats,
     b: Floats,
     k: int,
-    count: int,
+    count: int | np.int64,
     out: Floats,
     work: Floats,
 ) -> None:

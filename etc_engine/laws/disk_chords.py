@@ -275,8 +275,9 @@ def _means(apart: float, a: float, b: float, row: int, out: Floats) -> None:
         out[2, 0] += even
         out[2, 1] += even * s
         out[2, 2] += even * second
-    out[1] /= 2.0 * math.pi * m
-    out[2] /= 4.0 * math.pi * m
+    for l in range(3):  # an assignment to a slice of an array takes numba a second to compile
+        out[1, l] /= 2.0 * math.pi * m
+        out[2, l] /= 4.0 * math.pi * m
     # ln|rho' z| is smooth at the centre; the mean of ln|z| over chord b is ln cos^2(b/2)
     mean = -0.5 * (log + math.log(product)) / m - 2.0 * math.log(math.cos(0.5 * b))
     out[0, 0] = -(0.5 * mean + math.log(math.sin(0.5 * a))) / math.pi

@@ -265,6 +265,7 @@ def _cap_matrix(
     """F of all caps into ``caps[1:, 1:]``, D of the disk in them into row and column 0; ``b`` = sin^2(theta/2)."""
     radius = row[_R1 + side]
     column, work = np.empty(RINGS + 1), np.empty((6, max(Y_TERMS, RINGS + 1)))
+    one = np.int64(1)  # a plain 1 is a type of its own for numba: a second compilation
     for k in range(rings + 1):
         sine = min(edges[k] / radius, 1.0)
         b[k] = 0.5 * sine * sine / (1.0 + np.sqrt(1.0 - sine * sine))
@@ -273,7 +274,7 @@ def _cap_matrix(
         for l in range(k + 1):
             caps[1 + l, 1 + k] = caps[1 + k, 1 + l] = column[l]
         if row[_CONTACT] > 0.0:
-            coaxial_column(tables[1], b, k, 1, column, work)
+            coaxial_column(tables[1], b, k, one, column, work)
             caps[0, 1 + k] = caps[1 + k, 0] = column[0]
 
 
@@ -306,7 +307,9 @@ def _ring_matrix(
             m[l, disk + k] = (high * m[l, disk + k] - low * m[l, disk + k - 1]) / (high - low)
     if disk:
         m[0, 0] = m[0, 1] = m[1, 0] = 4.0 * np.pi * disk_resistance
-    m[:size, :size] *= scale
+    for k in range(size):
+        for l in range(size):
+            m[k, l] *= scale
     return size
 
 
@@ -328,17 +331,22 @@ def _condense(rows, disks, tables, resistances, shapes):  # type: ignore[no-unty
         sides = 1 if alike else 2
         for side in range(sides):
             _cap_matrix(row, side, edges, most, tables, caps[side], b[side])
-        resistances[p] = 0.0
+        for side in range(3):
+            resistances[p, side] = 0.0
         for stride in (1, 2):
             rings = most // stride
             size = rings + 1 + disk
             share = 1.0 if most == 0 else (4.0 / 3.0 if stride == 1 else -1.0 / 3.0)
-            factor[:size, :size] = 0.0
+            for k in range(size):
+                for l in range(size):
+                    factor[k, l] = 0.0
             for side in range(sides):
                 scale = 1.0 / (4.0 * np.pi * row[_K1 + side] * row[_R1 + side])
                 _ring_matrix(caps[side], b[side], (rings, stride, disk), scale, disks[p, side], m[side])
-                factor[:size, :size] += m[side, :size, :size] * (2.0 if alike else 1.0)
-            fluid[:2] = 0.0  # the modes of the disk have no tube
+                for k in range(size):
+                    for l in range(size):
+                        factor[k, l] += m[side, k, l] * (2.0 if alike else 1.0)
+            fluid[0] = fluid[1] = 0.0  # the modes of the disk have no tube
             for k in range(rings + 1):
                 conductance = tubes[k * stride]
                 if k > 0 and stride == 2:
@@ -346,14 +354,21 @@ def _condense(rows, disks, tables, resistances, shapes):  # type: ignore[no-unty
                 fluid[disk + k] = 1.0 / conductance
                 factor[disk + k, disk + k] += fluid[disk + k]
             if disk:
-                factor[:2, :2] += row[_BOND]
+                for k in range(2):
+                    for l in range(2):
+                        factor[k, l] += row[_BOND]
             if most == 0 and disk:
                 w[0], w[1] = 1.0, 0.0
             else:
                 _solve_ones(factor, size, w)
-                w[:size] /= w[:size].sum()
+                total = 0.0
+                for k in range(size):
+                    total += w[k]
+                for k in range(size):
+                    w[k] /= total
             if stride == 1:
-                shapes[p, :size] = w[:size]
+                for k in range(size):
+                    shapes[p, k] = w[k]
             gap = row[_BOND] * (w[0] + w[1]) ** 2 if disk else 0.0
             for k in range(size):
                 gap += fluid[k] * w[k] * w[k]
@@ -398,7 +413,9 @@ def legendre_means(row: NDArray[np.float64], side: int, shape: NDArray[np.float6
     edges = np.empty(RINGS + 1)
     rings = ring_edges(row, edges)
     disk = 1 if row[_CONTACT] > 0.0 else 0
-    x, lower, upper, weight = np.empty(RINGS + 1), np.ones(RINGS + 1), np.empty(RINGS + 1), np.zeros(RINGS + 1)
+    x, lower, upper, weight = np.empty(RINGS + 1), np.empty(RINGS + 1), np.empty(RINGS + 1), np.zeros(RINGS + 1)
+    for k in range(RINGS + 1):
+        lower[k] = 1.0
     inside = 0.0
     for k in range(rings + 1):
         sine = min(edges[k] / radius, 1.0)

@@ -170,9 +170,11 @@ def find_backbones(network: Links, axes: tuple[int, ...] | None = None) -> dict[
 @njit(cache=True)
 def _root(parent: NDArray[np.int64], offset: NDArray[np.int64], i: int, displacement: NDArray[np.int64]) -> int:
     """Root of i; ``displacement`` becomes the boxes between the two (union by size keeps paths short)."""
-    displacement[:] = 0
+    for axis in range(displacement.size):
+        displacement[axis] = 0
     while parent[i] != i:
-        displacement += offset[i]
+        for axis in range(displacement.size):
+            displacement[axis] += offset[i, axis]
         i = parent[i]
     return i
 
@@ -183,32 +185,37 @@ def join_clusters(
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Cluster label (lowest row) of each particle, and the axes around which each labelled cluster wraps."""
     d = shifts.shape[1]
-    parent = np.arange(n)
-    size = np.ones(n, dtype=np.int64)
+    parent, size, label = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for i in range(n):
+        parent[i], size[i], label[i] = i, 1, -1
     offset = np.zeros((n, d), dtype=np.int64)
     winding = np.zeros((n, d), dtype=np.bool_)
-    of_i, of_j = np.zeros(d, dtype=np.int64), np.zeros(d, dtype=np.int64)
+    of_i, of_j, step = np.empty(d, dtype=np.int64), np.empty(d, dtype=np.int64), np.empty(d, dtype=np.int64)
     for c in range(pairs.shape[0]):
         a = _root(parent, offset, pairs[c, 0], of_i)
         b = _root(parent, offset, pairs[c, 1], of_j)
-        step = of_i + shifts[c] - of_j  # displacement of root b from root a along this contact
+        for axis in range(d):
+            step[axis] = of_i[axis] + shifts[c, axis] - of_j[axis]  # of root b from root a along this contact
         if a == b:
-            winding[a] |= step != 0
+            for axis in range(d):
+                winding[a, axis] |= step[axis] != 0
             continue
+        sign = 1
         if size[a] < size[b]:
-            a, b, step = b, a, -step
+            a, b, sign = b, a, -1
         parent[b] = a
         size[a] += size[b]
-        offset[b] = step
-        winding[a] |= winding[b]
-    label = np.full(n, -1, dtype=np.int64)
+        for axis in range(d):
+            offset[b, axis] = sign * step[axis]
+            winding[a, axis] |= winding[b, axis]
     clusters = np.empty(n, dtype=np.int64)
     wraps = np.zeros((n, d), dtype=np.bool_)
     for i in range(n):
         root = _root(parent, offset, i, of_i)
         if label[root] < 0:
             label[root] = i
-            wraps[i] = winding[root]
+            for axis in range(d):
+                wraps[i, axis] = winding[root, axis]
         clusters[i] = label[root]
     return clusters, wraps
 
@@ -226,7 +233,8 @@ def prune_dead_ends(
     degree = start[1:].copy()
     for w in range(wall_particles.size):
         degree[wall_particles[w]] += 1
-    start = np.cumsum(start)
+    for i in range(n):
+        start[i + 1] += start[i]
     fill = start[:-1].copy()
     partner = np.empty(2 * m, dtype=np.int64)
     for c in range(m):

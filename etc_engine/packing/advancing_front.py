@@ -209,10 +209,10 @@ def _tangent_position(a, b, r, x, y, sizes, lx, ly):  # type: ignore[no-untyped-
     wall_a, wall_b = a - sizes.size, b - sizes.size
     if wall_a < 0 and wall_b < 0:
         return _tangent_to_disks(x[a], y[a], sizes[a], x[b], y[b], sizes[b], r)
-    if wall_a < 0:
-        return _tangent_to_wall(x[a], y[a], sizes[a], wall_b, True, r, lx, ly)
-    if wall_b < 0:
-        return _tangent_to_wall(x[b], y[b], sizes[b], wall_a, False, r, lx, ly)
+    if wall_a < 0 or wall_b < 0:
+        outwards = wall_a < 0
+        disk, wall = (a, wall_b) if outwards else (b, wall_a)
+        return _tangent_to_wall(x[disk], y[disk], sizes[disk], wall, outwards, r, lx, ly)
     across, along = min(wall_a, wall_b), max(wall_a, wall_b)
     if across >= 2 or along < 2:  # opposite walls
         return False, 0.0, 0.0
@@ -251,7 +251,8 @@ def _all_hits(a, b, r, cx, cy, x, y, sizes, grids, heads, following, hits):  # t
                     if (x[j] - cx) ** 2 + (y[j] - cy) ** 2 < touch * touch and j not in (a, b):
                         if count == hits.size:
                             larger = np.empty(2 * count, dtype=np.int64)
-                            larger[:count] = hits
+                            for m in range(count):
+                                larger[m] = hits[m]
                             hits = larger
                         hits[count] = j
                         count += 1
@@ -289,7 +290,9 @@ def _append(queue, end, a, b, tries):  # type: ignore[no-untyped-def]
     """The queue, larger if need be, with one more edge at its end."""
     if end == len(queue):
         larger = np.empty((2 * end, 3), dtype=np.int32)
-        larger[:end] = queue
+        for k in range(end):
+            for m in range(3):
+                larger[k, m] = queue[k, m]
         queue = larger
     queue[end, 0], queue[end, 1], queue[end, 2] = a, b, tries
     return queue
@@ -306,16 +309,20 @@ def _fill(sizes, grids, corners, retries, wall_depth):  # type: ignore[no-untype
     n, placed = sizes.size, 0
     lx, ly = grids.lengths[0], grids.lengths[1]
     x, y = np.empty(n), np.empty(n)
-    heads = np.full(grids.first_cell[-1], -1, dtype=np.int32)
-    following = np.full(n, -1, dtype=np.int32)
-    front, front_begin, front_end = np.empty((2 * n + 16, 3), dtype=np.int32), 0, 0
-    wall_front, wall_begin, wall_end = np.empty((256, 3), dtype=np.int32), 0, 0
-    pending, pending_end = np.empty((256, 3), dtype=np.int32), 0
+    heads, following = np.empty(grids.first_cell[-1], dtype=np.int32), np.empty(n, dtype=np.int32)
+    for c in range(heads.size):
+        heads[c] = -1
+    for i in range(n):
+        following[i] = -1
+    none = np.int64(0)  # a plain 0 is a type of its own for numba: another compilation of `_append`
+    front, front_begin, front_end = np.empty((2 * n + 16, 3), dtype=np.int32), 0, none
+    wall_front, wall_begin, wall_end = np.empty((256, 3), dtype=np.int32), 0, none
+    pending, pending_end = np.empty((256, 3), dtype=np.int32), none
     hits = np.empty(64, dtype=np.int64)
     seen = {np.int64(-1)}  # edges made by hits, each tried once
 
     for corner in range(len(corners)):
-        front = _append(front, front_end, n + corners[corner, 0], n + corners[corner, 1], 0)
+        front = _append(front, front_end, n + corners[corner, 0], n + corners[corner, 1], none)
         front_end += 1
 
     while placed < n:
@@ -347,10 +354,10 @@ def _fill(sizes, grids, corners, retries, wall_depth):  # type: ignore[no-untype
                     continue
                 seen.add(edge)
                 if (p >= n or q >= n) and depth < wall_depth * r:
-                    wall_front = _append(wall_front, wall_end, p, q, 0)
+                    wall_front = _append(wall_front, wall_end, p, q, none)
                     wall_end += 1
                 else:
-                    pending = _append(pending, pending_end, p, q, 0)
+                    pending = _append(pending, pending_end, p, q, none)
                     pending_end += 1
             continue
         x[placed], y[placed] = cx, cy
@@ -358,12 +365,13 @@ def _fill(sizes, grids, corners, retries, wall_depth):  # type: ignore[no-untype
         following[placed], heads[cell] = heads[cell], placed
         for p, q in ((a, placed), (placed, b)):
             if p >= n or q >= n:
-                wall_front = _append(wall_front, wall_end, p, q, 0)
+                wall_front = _append(wall_front, wall_end, p, q, none)
                 wall_end += 1
             else:
-                front = _append(front, front_end, p, q, 0)
+                front = _append(front, front_end, p, q, none)
                 front_end += 1
         placed += 1
     centers = np.empty((placed, 2))
-    centers[:, 0], centers[:, 1] = x[:placed], y[:placed]
+    for i in range(placed):
+        centers[i, 0], centers[i, 1] = x[i], y[i]
     return centers

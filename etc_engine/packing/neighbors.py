@@ -107,8 +107,9 @@ def _sort_into_cells(centers, level, cells, first_cell, lengths, classes):  # ty
         starts[cell[i] + 1] += 1
     for c in range(starts.size - 1):
         starts[c + 1] += starts[c]
-    fill = starts[:-1].copy()
-    order = np.empty(n, dtype=np.int64)
+    fill, order = np.empty(starts.size, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for c in range(starts.size):
+        fill[c] = starts[c]
     for i in range(n):
         order[fill[cell[i]]] = i
         fill[cell[i]] += 1
@@ -119,7 +120,7 @@ def _sort_into_cells(centers, level, cells, first_cell, lengths, classes):  # ty
 
 
 @njit(cache=True)
-def _search(centers, radii, grids, gap, relative, images):  # type: ignore[no-untyped-def]  # noqa: PLR0915
+def _search(centers, radii, grids, gap, relative, images):  # type: ignore[no-untyped-def]
     """Pairs found by every particle in the grids of its own and of the larger classes."""
     level, cells, first_cell, largest, lengths, periodic = grids
     order, starts, begin = _sort_into_cells(centers, level, cells, first_cell, lengths, largest.size)
@@ -129,13 +130,14 @@ def _search(centers, radii, grids, gap, relative, images):  # type: ignore[no-un
     out_j = np.empty(capacity, dtype=np.int64)
     out_shift = np.empty((capacity, 3), dtype=np.int32)
     out_gap = np.empty(capacity)
+    longest = max(lengths[0], lengths[1], lengths[2])
     found = 0
     for own in range(largest.size):
         for place in range(begin[own], begin[own + 1]):
             i = order[place]
             for k in range(own + 1):
                 reach = (radii[i] + largest[k]) * (1.0 + 0.5 * relative) + gap
-                reach += 1e-12 * (reach + lengths.max())  # rounding of the cell index must not lose a pair
+                reach += 1e-12 * (reach + longest)  # rounding of the cell index must not lose a pair
                 x0, x1 = cell_range(centers[i, 0], reach, lengths[0], cells[k, 0], periodic[0])
                 y0, y1 = cell_range(centers[i, 1], reach, lengths[1], cells[k, 1], periodic[1])
                 z0, z1 = cell_range(centers[i, 2], reach, lengths[2], cells[k, 2], periodic[2])
@@ -172,12 +174,9 @@ def _search(centers, radii, grids, gap, relative, images):  # type: ignore[no-un
                                     continue
                                 if found == capacity:
                                     capacity *= 2
-                                    out_i = _grown(out_i, capacity)
-                                    out_j = _grown(out_j, capacity)
-                                    out_gap = _grown(out_gap, capacity)
-                                    bigger = np.empty((capacity, 3), dtype=np.int32)
-                                    bigger[:found] = out_shift
-                                    out_shift = bigger
+                                    out_i, out_j, out_shift, out_gap = _grown(
+                                        out_i, out_j, out_shift, out_gap, capacity
+                                    )
                                 out_i[found], out_j[found], out_gap[found] = low, high, surface
                                 out_shift[found, 0], out_shift[found, 1], out_shift[found, 2] = tx, ty, tz
                                 found += 1
@@ -185,10 +184,15 @@ def _search(centers, radii, grids, gap, relative, images):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def _grown(values, capacity):  # type: ignore[no-untyped-def]
-    bigger = np.empty(capacity, dtype=values.dtype)
-    bigger[: values.size] = values
-    return bigger
+def _grown(out_i, out_j, out_shift, out_gap, capacity):  # type: ignore[no-untyped-def]
+    """The same pairs with room for more."""
+    i, j = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
+    shift, gap = np.empty((capacity, 3), dtype=np.int32), np.empty(capacity)
+    for m in range(out_i.size):
+        i[m], j[m], gap[m] = out_i[m], out_j[m], out_gap[m]
+        for axis in range(3):
+            shift[m, axis] = out_shift[m, axis]
+    return i, j, shift, gap
 
 
 @njit(cache=True)
@@ -207,14 +211,16 @@ def _after(i, j, shift, a, b):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _sort_pairs(i, j, shift, n):  # type: ignore[no-untyped-def]
     """Stable order of the pairs by (i, j, shift): counting sorts by j, then i, then the few equal ones."""
-    order = np.arange(i.size)
+    order = np.empty(i.size, dtype=np.int64)
+    for m in range(i.size):
+        order[m] = m
     for key in (j, i):
         fill = np.zeros(n + 1, dtype=np.int64)
         for m in range(key.size):
             fill[key[m] + 1] += 1
         for row in range(n):
             fill[row + 1] += fill[row]
-        sorted_order = np.empty_like(order)
+        sorted_order = np.empty(order.size, dtype=np.int64)
         for m in order:
             sorted_order[fill[key[m]]] = m
             fill[key[m]] += 1

@@ -36,8 +36,9 @@ def sort_into_grid(centers, lengths, cells):  # type: ignore[no-untyped-def]
         starts[number + 1] += 1
     for c in range(starts.size - 1):
         starts[c + 1] += starts[c]
-    fill = starts[:-1].copy()
-    order = np.empty(n, dtype=np.int64)
+    fill, order = np.empty(starts.size, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for c in range(starts.size):
+        fill[c] = starts[c]
     for i in range(n):
         order[fill[cell[i]]] = i
         fill[cell[i]] += 1
@@ -193,17 +194,47 @@ def area_and_centroid(polygon, vertices):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _sort_planes(planes, sources, count, ranked, from_whom):  # type: ignore[no-untyped-def]
     """Copies in ascending c; ties keep their order."""
-    order = np.argsort(planes[:count, 3], kind="mergesort")
+    order = rank(planes, 3, count)
     for k in range(count):
-        ranked[k] = planes[order[k]]
-        from_whom[k] = sources[order[k]]
+        for m in range(4):
+            ranked[k, m] = planes[order[k], m]
+            from_whom[k, m] = sources[order[k], m]
 
 
 @njit(cache=True)
-def _room(values, more):  # type: ignore[no-untyped-def]
-    bigger = np.empty((2 * values.shape[0] + more, values.shape[1]), dtype=values.dtype)
-    bigger[: values.shape[0]] = values
-    return bigger
+def rank(values, column, count):  # type: ignore[no-untyped-def]
+    """Rows of ``values`` in ascending order of a column; ties keep their order.
+
+    Merge sort from runs of one upwards, as numba's own argsort, which takes a second to compile.
+    """
+    order, other = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    for k in range(count):
+        order[k] = k
+    width = 1
+    while width < count:
+        for begin in range(0, count, 2 * width):
+            middle, end = min(begin + width, count), min(begin + 2 * width, count)
+            left, right = begin, middle
+            for k in range(begin, end):
+                if left < middle and (right >= end or not values[order[right], column] < values[order[left], column]):
+                    other[k] = order[left]
+                    left += 1
+                else:
+                    other[k] = order[right]
+                    right += 1
+        order, other = other, order
+        width *= 2
+    return order
+
+
+@njit(cache=True)
+def _room(who, what, rows):  # type: ignore[no-untyped-def]
+    """The same rows with room for more."""
+    more_who, more_what = np.empty((rows, who.shape[1]), dtype=np.int64), np.empty((rows, what.shape[1]))
+    for k in range(who.shape[0]):
+        for m in range(who.shape[1]):
+            more_who[k, m], more_what[k, m] = who[k, m], what[k, m]
+    return more_who, more_what
 
 
 @njit(cache=True)
@@ -215,7 +246,9 @@ def tessellate(seeds, frame, grid, spacing, widest):  # type: ignore[no-untyped-
     """
     centers, weights = seeds
     n = centers.shape[0]
-    heaviest = weights.max()
+    heaviest = weights[0]
+    for i in range(1, n):
+        heaviest = max(heaviest, weights[i])
     volumes = np.zeros(n)
     who = np.empty((9 * n + 64, 5), dtype=np.int64)
     what = np.empty((9 * n + 64, 5))
@@ -230,8 +263,9 @@ def tessellate(seeds, frame, grid, spacing, widest):  # type: ignore[no-untyped-
             found, volume, farthest = first, 0.0, 0.0
             count = gather_planes(i, reach, seeds, frame, grid, planes, sources)
             while count == -2:
-                planes, ranked = _room(planes, 0), _room(ranked, 0)
-                sources, from_whom = _room(sources, 0), _room(from_whom, 0)
+                room = 2 * planes.shape[0]
+                sources, planes = _room(sources, planes, room)
+                from_whom, ranked = _room(from_whom, ranked, room)
                 count = gather_planes(i, reach, seeds, frame, grid, planes, sources)
             if count < 0:
                 break
@@ -250,7 +284,7 @@ def tessellate(seeds, frame, grid, spacing, widest):  # type: ignore[no-untyped-
                 if not mine or area <= SMALLEST_FACET * spacing * spacing:
                     continue
                 if found == who.shape[0]:
-                    who, what = _room(who, 64), _room(what, 64)
+                    who, what = _room(who, what, 2 * found + 64)
                 who[found, 0], who[found, 1], who[found, 2], who[found, 3], who[found, 4] = i, j, sx, sy, sz
                 what[found, 0], what[found, 4] = area, ranked[f, 3]
                 for axis in range(3):

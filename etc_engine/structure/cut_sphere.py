@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from etc_engine.structure.clipping import MOST_VERTICES, clip_facet
+from etc_engine.structure.clipping import MOST_VERTICES, clip_facet, rank
 
 SAME_PLANE = 1e-15
 """Two planes closer than this part of the radius are one."""
@@ -73,7 +73,9 @@ def _cone_angle(planes, count, rooms):  # type: ignore[no-untyped-def]
     """Solid angle of the cone within half-spaces whose planes go through the centre, on the faces of a cube."""
     tangents, polygon, spare = rooms
     around = np.zeros((count + 6, 4))
-    around[:count, :3] = planes[:count, :3]
+    for m in range(count):
+        for axis in range(3):
+            around[m, axis] = planes[m, axis]
     for face in range(6):
         around[count + face, face // 2], around[count + face, 3] = 1.0 - 2.0 * (face % 2), 1.0
     total = 0.0
@@ -113,21 +115,26 @@ def cut_sphere_volume(radius, normals, cuts):  # type: ignore[no-untyped-def]
     >>> round(half / np.pi, 12)
     0.666666666667
     """
-    order = np.argsort(cuts, kind="mergesort")
-    planes, count = np.empty((cuts.size, 4)), 0
-    for m in order:
+    unsorted, count = np.empty((cuts.size, 4)), np.int64(0)
+    for m in range(cuts.size):
         if cuts[m] <= -radius:
             return 0.0
-        if cuts[m] >= radius:
-            break
-        planes[count, :3] = normals[m]
-        planes[count, 3] = cuts[m]
-        count += 1
+        if cuts[m] < radius:
+            unsorted[count, 3] = cuts[m]
+            for axis in range(3):
+                unsorted[count, axis] = normals[m, axis]
+            count += 1
+    planes, near = np.empty((count, 4)), 0
+    for m, row in enumerate(rank(unsorted, 3, count)):
+        for k in range(4):
+            planes[m, k] = unsorted[row, k]
+        near += abs(planes[m, 3]) <= NEAR_EDGE * radius
+    through = np.int64(0)
+    for m in range(count):
+        if near > 1 and abs(planes[m, 3]) <= NEAR_EDGE * radius:
+            planes[m, 3] = 0.0
+        through += planes[m, 3] == 0.0
     rooms = np.empty((2, 3)), np.empty((MOST_VERTICES, 2)), np.empty((MOST_VERTICES, 2))
-    near = np.abs(planes[:count, 3]) <= NEAR_EDGE * radius
-    if near.sum() > 1:
-        planes[:count, 3][near] = 0.0
-    through = (planes[:count, 3] == 0.0).sum()
     if count > 0 and planes[0, 3] < 0.0:
         volume = 0.0
     elif through:

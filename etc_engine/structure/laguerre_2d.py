@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from etc_engine.arrays import Flags, Floats, Ints
+from etc_engine.arrays import Flags, Floats, Ints, read_only
 from etc_engine.box import Box
 from etc_engine.errors import GeometryError
 from etc_engine.structure.polygons import clip_cells, cluster, lasting_sides, match_sides, sort_into_bins
@@ -121,7 +121,7 @@ def laguerre_cells(centers: Floats, radii: Floats, box: Box) -> LaguerreCells:
     """
     if box.dimension != 2:
         raise GeometryError(f"Laguerre cells of disks need a two-dimensional box, found {box.dimension} axes")
-    centers, radii = np.ascontiguousarray(centers, np.float64), np.ascontiguousarray(radii, np.float64)
+    centers, radii = read_only(centers), read_only(radii)
     lengths, periodic = np.asarray(box.lengths), np.asarray(box.periodic)
     spacing = float(np.sqrt(box.volume / radii.size))
     bins = np.maximum(np.floor(lengths / (1.2 * spacing)), 1.0).astype(np.int64)
@@ -226,7 +226,7 @@ def _edge_geometry(centers: Floats, radii: Floats, box: Box, i: Ints, who: Ints)
 def _merge_vertices(points: Floats, corners: Floats, box: Box, near: float) -> tuple[Ints, Floats]:
     """Number of the vertex at each corner, and the corners moved to where that vertex is."""
     lengths = np.asarray(box.lengths)
-    wrapped = box.wrap(points)
+    wrapped = read_only(box.wrap(points))
     bins = np.maximum(np.floor(lengths * np.sqrt(0.5 * len(points) / box.volume)), 1.0).astype(np.int64)
     bins = np.minimum(bins, np.maximum(np.floor(lengths / (4.0 * near)), 1.0).astype(np.int64))
     order, first = sort_into_bins(wrapped, lengths, bins)

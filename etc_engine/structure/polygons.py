@@ -22,12 +22,21 @@ def sort_into_bins(points, lengths, bins):  # type: ignore[no-untyped-def]
         first[where[p] + 1] += 1
     for c in range(first.size - 1):
         first[c + 1] += first[c]
-    fill = first[:-1].copy()
-    order = np.empty(n, dtype=np.int64)
+    fill, order = np.empty(first.size, dtype=np.int64), np.empty(n, dtype=np.int64)
+    for c in range(first.size):
+        fill[c] = first[c]
     for p in range(n):
         order[fill[where[p]]] = p
         fill[where[p]] += 1
     return order, first
+
+
+@njit(cache=True)
+def _copy_corner(xy, labels, row, to_xy, to_labels, to_row):  # type: ignore[no-untyped-def]
+    """Copy a corner and the labels of its side. An assignment of slices takes numba a second to compile."""
+    to_xy[to_row, 0], to_xy[to_row, 1] = xy[row, 0], xy[row, 1]
+    to_labels[to_row, 0], to_labels[to_row, 1] = labels[row, 0], labels[row, 1]
+    to_labels[to_row, 2] = labels[row, 2]
 
 
 @njit(cache=True)
@@ -49,18 +58,18 @@ def _clip_polygon(xy, labels, count, nx, ny, c, spare, spare_labels):  # type: i
         here = nx * xy[k, 0] + ny * xy[k, 1] - c
         there = nx * xy[following, 0] + ny * xy[following, 1] - c
         if here <= 0.0:
-            spare[kept, :] = xy[k, :]
-            spare_labels[kept, :] = labels[k, :]
+            _copy_corner(xy, labels, k, spare, spare_labels, kept)
             kept += 1
         if (here <= 0.0) != (there <= 0.0):
             part = here / (here - there)
             spare[kept, 0] = xy[k, 0] + part * (xy[following, 0] - xy[k, 0])
             spare[kept, 1] = xy[k, 1] + part * (xy[following, 1] - xy[k, 1])
-            spare_labels[kept, :] = labels[MOST_SIDES, :] if here <= 0.0 else labels[k, :]
+            side = MOST_SIDES if here <= 0.0 else k
+            for m in range(3):
+                spare_labels[kept, m] = labels[side, m]
             kept += 1
     for k in range(kept):
-        xy[k, :] = spare[k, :]
-        labels[k, :] = spare_labels[k, :]
+        _copy_corner(spare, spare_labels, k, xy, labels, k)
     return kept
 
 
@@ -134,7 +143,9 @@ def clip_cells(disks, grid):  # type: ignore[no-untyped-def]
     """
     centers, weights, lengths, periodic = disks
     bins = grid[2]
-    n, heaviest = centers.shape[0], weights.max()
+    n, heaviest = centers.shape[0], weights[0]
+    for i in range(1, n):
+        heaviest = max(heaviest, weights[i])
     starts = np.zeros(n + 1, dtype=np.int64)
     who = np.empty((8 * n + MOST_SIDES, 3), dtype=np.int64)
     corners = np.empty((8 * n + MOST_SIDES, 2))
@@ -146,7 +157,7 @@ def clip_cells(disks, grid):  # type: ignore[no-untyped-def]
         _rectangle(i, centers, lengths, periodic, xy, labels)
         for axis in range(2):
             home[axis] = min(max(int(centers[i, axis] / lengths[axis] * bins[axis]), 0), bins[axis] - 1)
-        count, ring = 4, 0
+        count, ring = np.int64(4), np.int64(0)  # plain numbers are types of their own: the kernels compile twice
         while True:
             count = _clip_ring(i, ring, home, count, disks, grid, polygon)
             if count < 3:
@@ -162,11 +173,11 @@ def clip_cells(disks, grid):  # type: ignore[no-untyped-def]
         if begin + count > who.shape[0]:
             more_who = np.empty((2 * who.shape[0], 3), dtype=np.int64)
             more_corners = np.empty((2 * who.shape[0], 2))
-            more_who[:begin], more_corners[:begin] = who[:begin], corners[:begin]
+            for k in range(begin):
+                _copy_corner(corners, who, k, more_corners, more_who, k)
             who, corners = more_who, more_corners
         for k in range(count):
-            who[begin + k, :] = labels[k, :]
-            corners[begin + k, :] = xy[k, :]
+            _copy_corner(xy, labels, k, corners, who, begin + k)
         starts[i + 1] = begin + count
     return starts, who[: starts[n]].copy(), corners[: starts[n]].copy(), -1
 
@@ -223,7 +234,9 @@ def lasting_sides(starts, vertices, corners, near):  # type: ignore[no-untyped-d
 @njit(cache=True)
 def match_sides(starts, who):  # type: ignore[no-untyped-def]
     """Edge of each side and whether the side is its first; the first sides in order; a side without partner, or -1."""
-    edges = np.full(who.shape[0], -1, dtype=np.int64)
+    edges = np.empty(who.shape[0], dtype=np.int64)
+    for row in range(edges.size):
+        edges[row] = -1
     forward = np.ones(who.shape[0], dtype=np.bool_)
     seen = np.empty(who.shape[0], dtype=np.int64)
     count = 0

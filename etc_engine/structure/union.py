@@ -186,7 +186,14 @@ def cut_disk_area(radius, normals, cuts):  # type: ignore[no-untyped-def]
         edges[count] = begin, end
         count += 1
     free, reached = 0.0, -np.pi
-    for m in np.argsort(edges[:count, 0]):
+    for m in range(1, count):  # insertion sort: intervals are few, and numba's own sort takes a second to compile
+        begin, end = edges[m, 0], edges[m, 1]
+        slot = m
+        while slot > 0 and edges[slot - 1, 0] > begin:
+            edges[slot, 0], edges[slot, 1] = edges[slot - 1, 0], edges[slot - 1, 1]
+            slot -= 1
+        edges[slot, 0], edges[slot, 1] = begin, end
+    for m in range(count):
         free += max(edges[m, 0] - reached, 0.0)
         reached = max(reached, edges[m, 1])
     free += max(np.pi - reached, 0.0)

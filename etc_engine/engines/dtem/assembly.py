@@ -99,8 +99,9 @@ def _assemble_csr(
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
     """K = sum_p P_p^T K_p P_p as CSR arrays (data, indices, indptr), columns sorted, repeated columns summed."""
     # the (at most two) element rows of every unknown
-    element = np.full((size, 2), -1, dtype=np.int64)
-    local = np.zeros((size, 2), dtype=np.int64)
+    element, local = np.empty((size, 2), dtype=np.int64), np.zeros((size, 2), dtype=np.int64)
+    for row in range(size):
+        element[row, 0] = element[row, 1] = -1
     capacity = 0
     for p in range(offsets.size - 1):
         for i in range(offsets[p + 1] - offsets[p]):

@@ -290,7 +290,7 @@ def condense(h: Floats, size: int, modes: int, work: Floats, out: Floats) -> boo
             work[m, n] = value
             n += 1
         m += 1
-    if not cholesky_inverse(work, m):
+    if not cholesky_inverse(work, size - 1):
         return False
     out[:] = 0.0
     row = 0
@@ -355,7 +355,7 @@ def _apply(
     values: Floats,
     temperatures: Floats,
 ) -> Floats:
-    flows = np.zeros_like(temperatures)
+    flows = np.zeros(temperatures.shape)
     for p in range(offsets.size - 1):
         first, n = offsets[p], offsets[p + 1] - offsets[p]
         for i in range(n):

@@ -252,9 +252,8 @@ def _fill(sides, rows, condensed, scales, repair, weights, starts, out):  # type
             a = first + i
             if pairs[a] >= 0:
                 legendre_means(rows[pairs[a]], ends[a], shapes[pairs[a]], means)
-                by_term[:, i] = means
-            else:
-                by_term[:, i] = 0.0
+            for l in range(terms):
+                by_term[l, i] = means[l] if pairs[a] >= 0 else 0.0
             for j in range(i):
                 b = first + j
                 cosine[q] = (

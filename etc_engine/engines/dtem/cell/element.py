@@ -208,7 +208,9 @@ def reduce_cell(i, cells, edges, grid, degrees, storing, materials, work):  # ty
             coupling[c, :size] = 0.0
         if numbers[0][c] != c and numbers[1][c] != c:  # a dense unknown that is not used
             matrix[c, c] = 1.0
-    solved[:count, :size] = coupling[:count, :size]
+    for c in range(count):
+        for a in range(size):
+            solved[c, a] = coupling[c, a]
     solve_cyclic(diagonal, beside, count, size, solved)
     for c in range(count):
         for a in range(size):

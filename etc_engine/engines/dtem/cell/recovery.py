@@ -135,7 +135,8 @@ def _recover(cells, edges, grid, frame, materials, work, result):  # type: ignor
     for i in range(cells[0].size - 1):
         count, inner, size = reduce_cell(i, cells, edges, grid, degrees, storing, materials, work)
         dense = np.empty(size)
-        dense[inner:] = values[starts[i] : starts[i + 1]]
+        for k in range(size - inner):
+            dense[inner + k] = values[starts[i] + k]
         substitute_back(matrix, inner, size, dense)
         polygon = cells[0][i + 1] - cells[0][i]
         before = np.empty(polygon + 1, dtype=np.int64)

@@ -109,7 +109,7 @@ def divide_edge(start, stop, cap, places, scales, count, law, points):  # type: 
     Each part of the edge is graded from its nearest place; the places inside are break points, and so are the middles
     between them.
     """
-    points[0], found = start, 1
+    points[0], found = start, np.int64(1)  # a plain 1 is a type of its own: a second compilation of `_divide_piece`
     tiny = 1e-9 * (stop - start)
     here = start
     for k in range(count):
@@ -166,8 +166,10 @@ def divide_edges(kind, ends, corner, width, smallest, cap):  # type: ignore[no-u
         begin = starts[e]
         if begin + found > points.size:
             more = np.empty(2 * points.size + 1024)
-            more[:begin] = points[:begin]
+            for k in range(begin):
+                more[k] = points[k]
             points = more
-        points[begin : begin + found] = buffer[:found]
+        for k in range(found):
+            points[begin + k] = buffer[k]
         starts[e + 1] = begin + found
     return starts, points[: starts[m]].copy()

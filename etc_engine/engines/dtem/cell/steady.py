@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from etc_engine.arrays import read_only
 from etc_engine.engines.dtem.cell.assembly import CellMaterials, CellSystem, assemble_cells
 from etc_engine.engines.dtem.cell.frame import Frame
 from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution, divide
@@ -106,7 +107,7 @@ def build_model(
     """
     resolution = resolution or Resolution()
     grid, frame = divide(geometry, solid, fluid, resolution, storing=storing)
-    materials = CellMaterials(geometry.radii, np.ascontiguousarray(solid, np.float64), float(fluid))
+    materials = CellMaterials(read_only(geometry.radii), read_only(solid), float(fluid))
     only, base = (None, None) if like is None else (geometry.wall_disks, like.system)
     system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials, only=only, base=base)
     return CellModel(geometry, materials, grid, frame, system)
@@ -115,7 +116,7 @@ def build_model(
 def common_part(geometry: CellGeometry, solid: Floats, fluid: float, resolution: Resolution | None = None) -> CellModel:
     """What models of one packing share whose contacts differ at walls only: all cells away from the walls."""
     grid, frame = divide(geometry, solid, fluid, resolution or Resolution())
-    materials = CellMaterials(geometry.radii, np.ascontiguousarray(solid, np.float64), float(fluid))
+    materials = CellMaterials(read_only(geometry.radii), read_only(solid), float(fluid))
     inner = np.setdiff1d(np.arange(geometry.count), geometry.wall_disks)
     system = assemble_cells(geometry.cells, geometry.edges, grid, frame, materials, only=inner)
     return CellModel(geometry, materials, grid, frame, system)
@@ -198,7 +199,10 @@ def _free_part(matrix: csr_matrix, held: NDArray[np.bool_]) -> csr_matrix:
 @njit(cache=True)
 def _select(data, indices, indptr, number):  # type: ignore[no-untyped-def]
     """Entries whose row and column have a new number, in one pass without a second copy."""
-    starts = np.zeros(number.max() + 2, dtype=indptr.dtype)
+    rows = 0
+    for row in range(number.size):
+        rows = max(rows, number[row] + 1)
+    starts = np.zeros(rows + 1, dtype=indptr.dtype)
     for row in range(number.size):
         if number[row] >= 0:
             for entry in range(indptr[row], indptr[row + 1]):

@@ -211,7 +211,9 @@ def solve_cut_disk(
     strengths = of_modes.copy()
     for j in range(chords):
         for m in range(offsets[j], offsets[j + 1]):
-            strengths[m] += points.weights[level[j], m - offsets[j]] * densities[m]
+            weight_here = points.weights[level[j], m - offsets[j]]
+            for column in range(chords * modes):
+                strengths[m, column] += weight_here * densities[m, column]
     _own_parts(alpha, fluxes, level, offsets, points, densities, h)
     for i in range(chords):
         for m in range(offsets[i], offsets[i + 1]):

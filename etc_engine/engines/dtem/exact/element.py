@@ -224,7 +224,9 @@ def _choose_levels(offsets: Ints, theta: Floats, alpha: Floats, modes: int) -> I
 @njit(cache=True)
 def _clearances(offsets: Ints, theta: Floats, alpha: Floats) -> Floats:
     """Distance of each chord's ends to the nearest end of another chord of its disk, in its half-widths."""
-    clearance = np.full(theta.size, np.inf)
+    clearance = np.empty(theta.size)
+    for a in range(theta.size):
+        clearance[a] = np.inf
     for p in range(offsets.size - 1):
         for a in range(offsets[p], offsets[p + 1]):
             for b in range(offsets[p], offsets[p + 1]):
@@ -260,7 +262,10 @@ def _fill(
                     for l in range(modes):
                         sign = (chords.signs[first + a] if k % 2 else 1.0) * (chords.signs[first + b] if l % 2 else 1.0)
                         h[a * modes + k, b * modes + l] *= sign / conductivity[p]
-            h[a * modes : (a + 1) * modes, a * modes : (a + 1) * modes] += chords.film.blocks[chords.rows[first + a]]
+            row = chords.rows[first + a]
+            for k in range(modes):
+                for l in range(modes):
+                    h[a * modes + k, a * modes + l] += chords.film.blocks[row, k, l]
         work = np.empty((size, size))
         if not condense(h, size, modes, work, values[starts[p] : starts[p + 1]]):
             return p

@@ -21,13 +21,14 @@ def loaded_waves(
     """Whether disk p carries heat, its waves (see `chord_waves`), and the mean temperature over each chord and mode."""
     modes = flows.shape[1]
     first, count = chords.offsets[p], chords.offsets[p + 1] - chords.offsets[p]
-    coefficients = np.zeros((count, modes))
+    coefficients, loaded = np.zeros((count, modes)), False
     for a in range(count):
         row = chords.rows[first + a]
         for k in range(modes):
             if row >= 0:
                 coefficients[a, k] = (chords.signs[first + a] if k % 2 else 1.0) * flows[row, k] / conductivity
-    if not np.any(coefficients):
+                loaded |= coefficients[a, k] != 0.0
+    if not loaded:
         return False, np.zeros((0, 2, 1)), np.zeros((0, 2)), np.zeros(0)
     theta, alpha, fluxes, levels = of_disk(chords, p)
     h = np.empty((count * modes, count * modes))

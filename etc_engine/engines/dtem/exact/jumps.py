@@ -104,7 +104,8 @@ def _deviations(
             row = chords.rows[first + a]
             if row >= 0:
                 chord_trace(a, chi, theta, alpha, transforms, constants, out[row])
-                out[row] -= means[a * modes]
+                for n in range(chi.size):
+                    out[row, n] -= means[a * modes]
 
 
 @njit(cache=True)
@@ -130,7 +131,10 @@ def _extension_energies(
                 energy = _least_extension(np.pi - chords.alpha[a], reach, depth, chi, jumps[row], slopes[row])
                 film = np.inf
                 if films[row] > 0.0:
-                    film = 0.5 * STEP * (jumps[row] ** 2 / np.cosh(0.5 * chi) ** 2).sum() / films[row]
+                    film = 0.0
+                    for n in range(chi.size):
+                        film += jumps[row, n] ** 2 / np.cosh(0.5 * chi[n]) ** 2
+                    film = 0.5 * STEP * film / films[row]
                 if film < conductivity[p] * energy:
                     in_films += film
                 else:

@@ -50,16 +50,21 @@ def chord_waves(
     flux, sink = np.empty(SINK_WAVES), np.empty(SINK_WAVES)
     for i in range(alpha.size):
         v = levels[i]
-        if np.any(coefficients[i]):
+        loaded = False
+        for k in range(modes):
+            loaded |= coefficients[i, k] != 0.0
+        if loaded:
             chord_transforms(fluxes, i, of_modes)
             for k in range(modes):
-                transforms[i, k % 2, :WAVES] += coefficients[i, k] * of_modes[k]
+                for n in range(WAVES):
+                    transforms[i, k % 2, n] += coefficients[i, k] * of_modes[k, n]
         net = coefficients[i, 0]
         for m in range(offsets[i + 1] - offsets[i]):
             density = densities[offsets[i] + m]
             net += points.weights[v, m] * density
-            transforms[i, 0] += density * points.cosines[v, :, m]
-            transforms[i, 1] += density * points.sines[v, :, m]
+            for n in range(SINK_WAVES):
+                transforms[i, 0, n] += density * points.cosines[v, n, m]
+                transforms[i, 1, n] += density * points.sines[v, n, m]
         strip_symbols(alpha[i], points.waves, flux, sink)
         constants[i, 0] = net
         constants[i, 1] = -net * centre_constant(alpha[i])
