@@ -178,12 +178,12 @@ def cut_disk_area(radius, normals, cuts):  # type: ignore[no-untyped-def]
         opening = np.arctan2(half, cuts[m])
         begin, end = middle - opening, middle + opening
         if begin < -np.pi:
-            edges[count] = begin + 2.0 * np.pi, np.pi
+            edges[count, 0], edges[count, 1] = begin + 2.0 * np.pi, np.pi
             begin, count = -np.pi, count + 1
         elif end > np.pi:
-            edges[count] = -np.pi, end - 2.0 * np.pi
+            edges[count, 0], edges[count, 1] = -np.pi, end - 2.0 * np.pi
             end, count = np.pi, count + 1
-        edges[count] = begin, end
+        edges[count, 0], edges[count, 1] = begin, end
         count += 1
     free, reached = 0.0, -np.pi
     for m in range(1, count):  # insertion sort: intervals are few, and numba's own sort takes a second to compile
