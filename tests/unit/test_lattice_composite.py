@@ -225,7 +225,7 @@ def test_voxels_make_layers_that_conduct_as_exactly_as_they_are_drawn():
         (lambda: find_phases([[0.1] * 3], CUBE, np.zeros((2, 2, 2))), "of integers"),
         (lambda: find_phases([[0.1] * 3], CUBE, lambda x: x[:, 0]), "whole phase number"),
         (lambda: spheres([[1.5, 0.5, 0.5]], 0.1, box=Box((1.0, 1.0, 1.0))), "outside the box"),
-        (lambda: spheres(CENTRE, 0.3, -1.0), "must not be negative"),
+        (lambda: spheres(CENTRE, 0.3, -1.0), "the conductivity of a particle is -1: give a number"),
         (lambda: fitted_seeds(spheres(CENTRE, 0.01).packing, 500, rng()), "too small for 500 lattice particles"),
         (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), particles=3), "at least 50 particles, found 3"),
         (lambda: homogenize_lattice(spheres(CENTRE, 0.3), rng=rng(), particles=5000.5), "at least 50 .* found 5000.5"),
