@@ -90,10 +90,12 @@ def _run_network(content: dict[str, Any], wanted: Wanted) -> int:
             done = run_transient(
                 study, wanted.study.parent, wanted.output, resume=wanted.resume, progress=progress.report
             )
-    except InputError:
+    except InputError as error:
         # a refused study leaves nothing behind, unless there is more than the start to continue from
         if not wanted.resume and not state_path(states, 1).exists():
             remove_states(wanted.output)
+        if isinstance(error, StudyError) and str(wanted.study) not in str(error):
+            raise StudyError(f"{wanted.study}: {error}") from None
         raise
     if done.stopped:
         click.echo(

@@ -79,8 +79,8 @@ def test_conductivities_by_type(run):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ({"source": "ids = [11]"}, "source.0.ids: there is no particle with the id 11"),
-        ({"source": 'types = ["3"]'}, "source.0.types: no particle is of the type 3"),
+        ({"source": "ids = [11]"}, "t.toml: source.0.ids: there is no particle with the id 11"),
+        ({"source": 'types = ["3"]'}, "t.toml: source.0.types: no particle is of the type 3"),
         ({"source": "ids = [10]\nparticles = [0]"}, "both choose particles"),
         ({"particles": "types = { 1 = 1.0 }"}, "the particles have the type 2 too"),
         ({"particles": "types = { 1 = 1.0, 2 = 1.0 }\nconductivity = 2.0"}, "remove one of them"),
