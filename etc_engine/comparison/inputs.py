@@ -10,6 +10,7 @@ from etc_engine.box import ball_measure
 from etc_engine.comparison.simulation import current_study
 from etc_engine.materials import accommodation_from_masses, find_solid, gas_state, jump_length
 from etc_engine.realization import Status
+from etc_engine.sweep.table import measured
 
 if TYPE_CHECKING:
     import xarray
@@ -42,7 +43,7 @@ def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     volume = volumes.isel(realization=0, drop=True) if files else volumes.mean("realization")
     found["diameter"] = 2.0 * (volume / float(ball_measure(1.0, dimension))) ** (1.0 / dimension)
     valid = dataset["status"] <= int(Status.NOT_PERCOLATING)
-    found["coordination"] = dataset["coordination"].where(valid).mean("realization")
+    found["coordination"] = measured(dataset, "coordination").where(valid).mean("realization")
     for name in ("temperature", "emissivity"):
         if name in dataset.coords:
             found[name] = dataset[name].reset_coords(drop=True)

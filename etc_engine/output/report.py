@@ -18,6 +18,7 @@ from etc_engine.comparison.sensitivity import sensitivities
 from etc_engine.comparison.simulation import in_words
 from etc_engine.realization import Status
 from etc_engine.study.quantities import QUANTITIES, SWEPT, heading_of, word_of
+from etc_engine.sweep.table import measured
 
 if TYPE_CHECKING:
     import xarray
@@ -216,7 +217,7 @@ def _statistics(dataset: xarray.Dataset, comparison: xarray.Dataset) -> str:
                 *_values(comparison, index),
                 str(n),
                 _number(float(cell["solid_fraction"]), ".4f"),
-                _number(float(dataset["coordination"].isel(index).mean()), ".3f"),
+                _number(float(measured(dataset, "coordination").isel(index).mean()), ".3f"),
                 _number(mean, ".5g"),
                 _number(width, ".2g"),
                 _number(100.0 * relative, ".2f"),

@@ -13,7 +13,7 @@ from etc_engine.study.conditions import derived_conductivities
 from etc_engine.study.quantities import QUANTITIES
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.statistics import interval, summarize
-from etc_engine.sweep.table import CELL_VARIABLES, MEASURES, UNIT_VARIABLES, WORD_FIELDS, Table
+from etc_engine.sweep.table import CELL_VARIABLES, MEASURED, MEASURES, UNIT_VARIABLES, WORD_FIELDS, Table
 
 if TYPE_CHECKING:
     import xarray
@@ -70,7 +70,8 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
     xarray.Dataset
         Dimensions ``density``, then those quantities that the study gives as a list, in the order of
         `etc_engine.study.quantities.QUANTITIES`, ``method`` (only where it lists methods), ``realization``,
-        ``direction_i``, ``direction_j``. A quantity with one value is a coordinate without a dimension.
+        ``direction_i``, ``direction_j``. A quantity with one value is a coordinate without a dimension. A computed
+        variable that has the name of a given quantity is stored as ``measured_NAME``.
     """
     import xarray
 
@@ -86,7 +87,8 @@ def assemble(study: Study, table: Table, attributes: Mapping[str, Any]) -> xarra
         dataset = dataset.assign_coords(bound=np.array(["lower", "upper"], dtype=object))
     for name, variable in CELL_VARIABLES.items():
         if name != "heat_imbalance" or study.conduction.nonlinear:
-            dataset[name] = (cell, cells[name], variable.attributes)
+            stored = MEASURED + name if name in study.quantities else name
+            dataset[stored] = (cell, cells[name], variable.attributes)
     dataset["status"] = (cell, cells["status"], _status_attributes())
     dataset["message"] = (cell, cells["message"], {"long_name": "what went wrong, in words"})
     for name, variable in UNIT_VARIABLES.items():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from etc_engine.realization import Outcome, Status
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.plan import stream_fingerprint
 from etc_engine.sweep.records import Record
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,28 @@ CELL_VARIABLES = {
     "solved_by": Variable(object, "", "full, or reduced: made of the solutions at other contact angles"),
     "snapshots": Variable(np.int64, -1, "solutions at other contact angles in a reduced one"),
 }
+MEASURED = "measured_"
+"""What the name of a variable begins with where the study gives a quantity of that name."""
+
+
+def measured(dataset: xarray.Dataset, name: str) -> xarray.DataArray:
+    """The variable of a result that was computed, not the quantity of the same name that its study gives.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of a sweep.
+    name : str
+        Variable of a cell or a unit, such as ``coordination``.
+
+    Returns
+    -------
+    xarray.DataArray
+        ``measured_coordination`` where the study gives ``contacts.coordination``, else ``coordination``.
+    """
+    return dataset[MEASURED + name] if MEASURED + name in dataset else dataset[name]
+
+
 WORD = np.int32
 """How a row holds a word: its number in the words of the table."""
 NO_WORDS = ("",)
