@@ -165,6 +165,17 @@ def _tell(outcome: Outcome, seconds: float, ranks: int) -> None:
             f"etc-engine: warning: no packing conducts ({reason}): see the density, and the rule and gap of [contacts]",
             err=True,
         )
+    rarefied = _rarefied(outcome.output)
+    if rarefied is not None:
+        click.echo(f"etc-engine: warning: {rarefied}", err=True)
+
+
+def _rarefied(output: Path) -> str | None:
+    from etc_engine.comparison.inputs import rarefied_words
+    from etc_engine.sweep.result_file import open_dataset
+
+    with open_dataset(output) as dataset:
+        return rarefied_words(dataset)
 
 
 def _commonest_message(output: Path, *, failed: bool) -> str:

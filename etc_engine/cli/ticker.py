@@ -18,8 +18,8 @@ LINE_SECONDS = 60.0
 BAR_SECONDS = 1.0
 """Between two refreshments on a terminal."""
 COMPILE_SECONDS = 30
-"""Compilation of the kernels of one study from an empty cache, on an idle machine: 36 s for bonded disks with the
-method cell and conducting pores, 23 s for spheres with the method chord (tests/VALIDATION.md, 23.5)."""
+"""Compilation of the kernels of one study from an empty cache, on an idle machine: 27 s for bonded disks with the
+method cell and conducting pores, and less for spheres with the method chord (tests/VALIDATION.md, 23.5)."""
 COMPILING = f"compiling kernels (once per machine, about {COMPILE_SECONDS} s)"
 FORM = "{percentage:3.0f}%|{bar}| {elapsed} {desc}"
 

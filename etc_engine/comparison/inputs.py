@@ -55,6 +55,42 @@ def known_inputs(dataset: xarray.Dataset) -> dict[str, xarray.DataArray]:
     return found
 
 
+def rarefied_words(dataset: xarray.Dataset) -> str | None:
+    """The warning that in some conditions of a sweep the gas is no continuum between the particles.
+
+    The temperature jump of one surface is then longer than the mean radius. Vacuum is exact and stays out.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of a sweep.
+
+    Returns
+    -------
+    str or None
+        One sentence with the temperature and pressure of the longest jump, or None where no jump is that long.
+    """
+    known = known_inputs(dataset)
+    if "jump_length" not in known:
+        return None
+    jump = known["jump_length"]
+    radius = 0.5 * float(known["diameter"].mean())
+    rarefied = (jump > radius) & np.isfinite(jump)
+    if not bool(rarefied.any()):
+        return None
+    place = np.unravel_index(int(np.argmax(jump.where(rarefied, 0.0).values)), jump.shape)
+    at = jump[place]
+    temperature, pressure = (
+        float((at if name in jump.dims else dataset)[name]) for name in ("temperature", "pressure")
+    )
+    return (
+        f"the temperature jump of the gas is longer than the mean radius {radius:.3g} m in {int(rarefied.sum())} of "
+        f"{jump.size} conditions, at most {float(at):.3g} m at {temperature:g} K and "
+        f"{pressure:g} Pa: the gas is no continuum there and its share of the conductivity is not "
+        "reliable; pressure 0 gives the exact limit"
+    )
+
+
 def _jump_length(study: dict[str, Any], dataset: xarray.Dataset) -> xarray.DataArray | None:
     """Jump length of one surface at every temperature and pressure; infinite in vacuum."""
     import xarray
