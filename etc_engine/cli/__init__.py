@@ -99,7 +99,7 @@ def cli(ctx: click.Context) -> None:
     etc-engine COMMAND --help explains a command.
 
     Completion of commands and options in bash: eval "$(_ETC_ENGINE_COMPLETE=bash_source etc-engine)". For zsh and fish
-    the words are zsh_source and fish_source.
+    use zsh_source and fish_source.
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

@@ -24,7 +24,7 @@ COLUMN = 18
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    help="Figure to write: .png, .pdf or .svg. Replaces one that is there.",
+    help="Figure to write: .png, .pdf or .svg. An existing figure is replaced.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
@@ -32,8 +32,8 @@ def compare_command(result: Path, output: Path | None, as_json: bool) -> int:
 
     Prints the simulated mean with its confidence half-width and the estimated error of its method beside every model
     of the study, and constants fitted over the density. A closest model is named only where it lies outside that
-    error. Exit status 3 if a rigorous bound is broken, which is possible for overlapping particles and for
-    whole cells with pores that conduct only.
+    error. Exit status 3 if a rigorous bound is violated. Bounds hold for overlapping particles, and for whole
+    cells with pores that conduct. Elsewhere they are only shown.
     """
     from etc_engine.cli.options import check_picture, check_place, print_json
     from etc_engine.comparison import evaluate_models, fit_models, model_lines

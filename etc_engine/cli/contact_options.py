@@ -29,7 +29,7 @@ OPTIONS = (
     ),
     click.option(
         "--contact-columns",
-        help="Columns of the dump by the words of compute pair/gran/local: 'pos id force contactArea heatFlux'.",
+        help="Columns of the dump, by the names of compute pair/gran/local: 'pos id force contactArea heatFlux'.",
     ),
 )
 

@@ -36,8 +36,8 @@ class _Format(click.ParamType):
 def export_command(result: Path, form: str, output: Path | None, fixed: tuple[str, ...]) -> None:
     """Write the conductivity of the sweep in RESULT (netCDF) over temperature for another program.
 
-    The file holds means with their confidence intervals, and a polynomial in temperature. The intervals choose its
-    order. Its residual stands in the comments.
+    The file holds means with their confidence intervals, and a polynomial in temperature. Its order is
+    the lowest one that stays within the intervals. The comments state its residual.
 
     csv: every cell. moose: input blocks. comsol: an interpolation file. openfoam: the transport dictionary of a solid.
     """

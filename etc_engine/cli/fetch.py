@@ -23,7 +23,7 @@ PARTS = {".nc": "result.nc", ".html": "report.html"}
     help="File to write: .nc, or .html for the report.",
 )
 def fetch_command(study: str, server: str, token_file: Path | None, output: Path) -> None:
-    """Write the result of STUDY (its identity), which is done, to a file."""
+    """Write the result of a finished STUDY (its identity) to a file."""
     from etc_engine.cli.options import check_place
     from etc_engine.service import client
 

@@ -44,19 +44,19 @@ LATTICE_PARTICLES = 20_000
 @click.option(
     "--boundary",
     type=click.Choice(("periodic", "walls")),
-    help="walls: two isothermal faces, the others adiabatic. By default as the box, of CSV periodic.",
+    help="walls: two isothermal faces, the others adiabatic. By default that of the box, and periodic for a CSV file.",
 )
 @click.option("--resolution", type=int, help="voxel: voxels along the shortest edge. By default 64.")
 @click.option("--solver", help="voxel: iteration, cg or eyre-milton. By default cg.")
 @click.option("--green", help="voxel: Green operator. By default rotated.")
 @click.option("--voxels", hidden=True)
-@click.option("--particles", type=int, help="lattice: number of particles, about. By default 20000.")
+@click.option("--particles", type=int, help="lattice: approximate number of particles. By default 20000.")
 @click.option("--seed", type=int, help="lattice: seed of its particles. By default 1.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="netCDF with inclusions and result.")
 @click.option(
     "--plot",
     type=click.Path(path_type=Path),
-    help="voxel: picture of voxels and heat flux. Of spheres the section with the largest area of inclusions.",
+    help="voxel: picture of voxels and heat flux. For spheres: the section with the largest area of inclusions.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def homogenize_command(
@@ -73,7 +73,7 @@ def homogenize_command(
     INCLUSIONS is a file of particles as etc-engine solve reads it, or a voxel image of labelled phases (.npy, TIFF,
     raw). --phases gives the conductivities of an image.
 
-    Overlapping inclusions count as their union. Where their conductivities differ the radical plane divides them. A
+    Overlapping inclusions count as their union. Where their conductivities differ, the radical plane divides them. A
     conductivity of 0 is an insulator, inf a perfect conductor.
     """
     clock = Clock()

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from etc_engine.particle_files.images import LabelImage
 
 OPTIONS = (
-    click.option("--phases", help="Of a voxel image: conductivity of each label [W/(m K)], such as 0=0.2,1=30."),
-    click.option("--shape", help="Of a raw voxel image: voxels along x, y and z, such as 100,100,100."),
-    click.option("--voxel-type", default="uint8", show_default=True, help="Of a raw voxel image: type of its numbers."),
+    click.option("--phases", help="Conductivity of each label of a voxel image [W/(m K)], such as 0=0.2,1=30."),
+    click.option("--shape", help="Number of voxels of a raw image along x, y and z, such as 100,100,100."),
+    click.option("--voxel-type", default="uint8", show_default=True, help="Number type of a raw voxel image."),
 )
 
 

@@ -19,7 +19,7 @@ import click
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def keys_command(section: str, kind: str, as_json: bool) -> None:
-    """Print the keys of study files: what each may be, its unit and its default.
+    """Print the keys of study files with type, unit and default.
 
     SECTION is a table of the study file, such as contacts. Without it all keys are printed.
     """

@@ -44,7 +44,11 @@ STDOUT = Path("-")
 )
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the packing and its structure.")
 @click.option(
-    "--bond-gap", type=float, default=1e-6, show_default=True, help="Largest gap of a contact counted, in mean radii."
+    "--bond-gap",
+    type=float,
+    default=1e-6,
+    show_default=True,
+    help="Largest gap that counts as a contact, in mean radii.",
 )
 @click.option("--contact-gap", hidden=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

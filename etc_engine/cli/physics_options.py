@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 OPTIONS = (
     click.option(
         "--rule",
-        help="Contact rule: overlap, bonded, radius, coordination, hertz or load. By default as the options say.",
+        help="Contact rule: overlap, bonded, radius, coordination, hertz or load. By default the other options decide.",
     ),
     click.option("--contact-radius", type=float, help="Radius of bonded contacts [m], instead of --contact-angle."),
     click.option(
@@ -50,8 +50,8 @@ OPTIONS = (
     ),
     click.option(
         "--wall-temperatures",
-        help="Temperatures of the walls at the low and the far end [K], 900:600: properties follow the local "
-        "one, along every walled axis asked for.",
+        help="Temperatures of the walls at the low and the far end [K], such as 900:600. Properties follow "
+        "the local temperature, along every walled axis asked for.",
     ),
 )
 

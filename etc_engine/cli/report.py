@@ -22,7 +22,7 @@ def report_command(results: tuple[Path, ...], output: Path) -> int:
     """Write one self-contained page on the sweep in RESULT (netCDF).
 
     Figures, statistics, models, convergence, failures and provenance. Further results of the same study in boxes of
-    other sizes show the convergence with system size. Exit status 3 if a rigorous bound is broken.
+    other sizes show the convergence with system size. Exit status 3 if a rigorous bound is violated.
     """
     from etc_engine.cli.options import check_picture, check_place
     from etc_engine.comparison import (

@@ -23,7 +23,7 @@ EXIT_DIFFERENT = 1
 def rerun_command(file: Path, density: float | None, realization: int, as_json: bool) -> int:
     """Run one realization of FILE again, with all its contact angles and methods.
 
-    Says for every variable whether it has the same bits. Exit status: 0 all agree, 1 some differ, 2 refused.
+    Reports for each variable whether its bits are the same. Exit status: 0 all agree, 1 some differ, 2 refused.
     """
     return compare_again(file, density, realization, as_json)
 

@@ -29,8 +29,19 @@ def _number(_context: click.Context, _option: click.Parameter, value: float) -> 
 
 @click.command("serve")
 @click.option("--data", required=True, callback=_place, help="Data directory: queue and results.")
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on. Any other needs a token.")
-@click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True, help="0 takes a free one.")
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address to listen on. Any address but the default needs a token.",
+)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8765,
+    show_default=True,
+    help="Port to listen on. 0 takes a free one.",
+)
 @click.option("--ranks", type=click.IntRange(1, MOST_RANKS), default=1, show_default=True, help="MPI ranks of a study.")
 @click.option("--launcher", type=click.Choice(["local", "slurm"]), default="local", show_default=True)
 @click.option("--sbatch", default="", help="Further options of sbatch, such as '--partition=short --time=2:00:00'.")
@@ -38,16 +49,30 @@ def _number(_context: click.Context, _option: click.Parameter, value: float) -> 
     "--token-file", type=click.Path(path_type=Path), help="File with the token. By default ETC_ENGINE_TOKEN holds it."
 )
 @click.option("--allow-host", "hosts", multiple=True, help="Another name of this service, such as that of a proxy.")
-@click.option("--max-units", type=click.IntRange(1), default=100_000, show_default=True, help="Packings of a study.")
-@click.option("--max-particles", type=click.IntRange(1), default=1_000_000, show_default=True, help="Of a packing.")
-@click.option("--max-memory", type=click.IntRange(256), default=8192, show_default=True, help="Of a rank [MB].")
+@click.option(
+    "--max-units",
+    type=click.IntRange(1),
+    default=100_000,
+    show_default=True,
+    help="Largest number of packings in a study.",
+)
+@click.option(
+    "--max-particles",
+    type=click.IntRange(1),
+    default=1_000_000,
+    show_default=True,
+    help="Largest number of particles in a packing.",
+)
+@click.option(
+    "--max-memory", type=click.IntRange(256), default=8192, show_default=True, help="Largest memory of a rank [MB]."
+)
 @click.option(
     "--max-hours",
     type=click.FloatRange(0.0, min_open=True),
     default=168.0,
     show_default=True,
     callback=_number,
-    help="Of a study.",
+    help="Longest run of a study [h].",
 )
 def serve_command(
     data: Path,

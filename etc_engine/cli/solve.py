@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 @click.option("--pipe-resistance", hidden=True)
 @click.option("--modes", type=int, help="Flux modes of a contact. With --method exact or arc.")
 @click.option("--degree", type=int, help="Polynomial degree on the edges of cells, 1 to 5. With --method cell.")
-@click.option("--bounds", is_flag=True, help="Rigorous bounds too. With --method cell and few disks.")
+@click.option("--bounds", is_flag=True, help="Compute rigorous bounds too. With --method cell, for few disks.")
 @click.option(
     "--contact-angle", type=float, help="Half-angle of bonded contacts [degrees]. Without it contacts are overlaps."
 )
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     type=float,
     default=0.0,
     show_default=True,
-    help="Conductivity of what fills the pores [W/(m K)].",
+    help="Conductivity of the fluid or matrix in the pores [W/(m K)].",
 )
 @physics_options
 @click.option(
@@ -81,7 +81,7 @@ if TYPE_CHECKING:
 @click.option("--vtk", type=click.Path(path_type=Path), help="VTK PolyData (.vtp) for ParaView.")
 @click.option("--plot", type=click.Path(path_type=Path), help="Picture of the temperature field.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@click.option("--full", is_flag=True, help="The temperature of every contact too. With --json.")
+@click.option("--full", is_flag=True, help="With --json: the temperature of every contact too.")
 @distributed_option
 def solve_command(
     particles: Path,
@@ -97,7 +97,7 @@ def solve_command(
     """Effective conductivity of the particles in a file.
 
     PARTICLES is one of: CSV with the columns x,y[,z],radius[,conductivity]. A LAMMPS or LIGGGHTS text dump. A netCDF
-    (.nc) or VTK (.vtp) file of etc-engine pack. VTK, extended XYZ, YADE or MercuryDPM of another DEM code. The word -
+    (.nc) or VTK (.vtp) file of etc-engine pack. VTK, extended XYZ, YADE or MercuryDPM of another DEM code. The name -
     is standard input.
 
     Along the load axis one wall is held at the temperature 1 and the other at 0, unless the box is periodic.

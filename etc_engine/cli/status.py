@@ -12,9 +12,9 @@ from etc_engine.cli.remote import connect, progress_of, server_options, shown
 @click.command("status")
 @click.argument("study", required=False)
 @server_options
-@click.option("--cancel", is_flag=True, help="End it. What is finished is kept.")
-@click.option("--resume", is_flag=True, help="Go on with it after it was cancelled or has failed.")
-@click.option("--remove", is_flag=True, help="Forget it with all its files. One that runs has to be cancelled first.")
+@click.option("--cancel", is_flag=True, help="Cancel the study. Finished units are kept.")
+@click.option("--resume", is_flag=True, help="Continue a study that was cancelled or has failed.")
+@click.option("--remove", is_flag=True, help="Delete the study and all its files. Cancel a running study first.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def status_command(
     study: str | None, server: str, token_file: Path | None, cancel: bool, resume: bool, remove: bool, as_json: bool

@@ -16,15 +16,15 @@ EXIT_RESUMABLE = 75
 @click.command("submit")
 @click.argument("study", type=click.Path(path_type=Path))
 @server_options
-@click.option("--wait", "waiting", is_flag=True, help="Wait until it has ended.")
+@click.option("--wait", "waiting", is_flag=True, help="Wait until the study has ended.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Wait, and write the result to this netCDF file.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def submit_command(
     study: Path, server: str, token_file: Path | None, waiting: bool, output: Path | None, as_json: bool
 ) -> int:
-    """Hand in STUDY (a TOML file). Its identity alone goes to stdout, all else to stderr.
+    """Hand in STUDY (a TOML file). Stdout gets its identity alone. Everything else goes to stderr.
 
-    The same study again is answered from the result that is there. With --wait the exit status is that of `sweep`: 0
+    A study that was submitted before is not computed again. With --wait the exit status is that of `sweep`: 0
     done, 4 done with failed realizations, 75 ended without a result.
     """
     from etc_engine.cli.options import check_place, print_json

@@ -40,11 +40,15 @@ class PartType(click.ParamType):
 @click.command("sweep")
 @click.argument("study", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="netCDF file to write. Only --dry-run does without."
+    "-o", "--output", type=click.Path(path_type=Path), help="netCDF file to write. Not needed with --dry-run."
 )
-@click.option("--resume", is_flag=True, help="Continue an earlier run. Start anew where there is none.")
+@click.option("--resume", is_flag=True, help="Continue an earlier run. Starts anew if there is none.")
 @click.option("--overwrite", is_flag=True, help="Start anew and replace what is there.")
-@click.option("--dry-run", is_flag=True, help="Print units, time, memory and what is there. Write nothing.")
+@click.option(
+    "--dry-run",
+    is_flag=True,
+    help="Print the number of units, the expected time and memory, and what is finished. Writes nothing.",
+)
 @click.option("--part", type=PartType(), help="Compute part K of N only. --resume without --part joins all parts.")
 def sweep_command(
     study: Path, output: Path | None, resume: bool, overwrite: bool, dry_run: bool, part: Part | None
