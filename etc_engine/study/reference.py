@@ -60,8 +60,8 @@ def key_rows(kind: str, section: str = "") -> tuple[KeyRow, ...]:
 
     Examples
     --------
-    >>> key_rows("sweep", "radiation")[0].key
-    'radiation.emissivity'
+    >>> [row.key for row in key_rows("sweep", "radiation")][:2]
+    ['radiation', 'radiation.emissivity']
     """
     if kind not in KINDS:
         raise InputError(f"there are no study files of the kind {kind!r}; there are: {', '.join(KINDS)}")

@@ -413,6 +413,6 @@ def parse_study(content: Mapping[str, Any], source: str = "study") -> NetworkStu
     --------
     >>> parse_study({"schema": 2, "kind": "network", "name": "bed", "packing": {"files": "bed.dump"}})
     Traceback (most recent call last):
-    etc_engine.errors.StudyError: study: particles: missing, expected a table ... (and 1 more problem)
+    etc_engine.errors.StudyError: study: particles: missing, expected a table ... (and 1 more problem)...
     """
     return validated(content, NetworkStudy, source)
