@@ -254,7 +254,7 @@ def test_overlapping_arcs_are_refused_with_the_particle():
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_bad_conductivities_are_refused(value):
     network = overlap_contacts(random_disks(9))
-    with pytest.raises(InputError, match="give a number of W/\\(m K\\) from 1e-100 to|must be positive and finite"):
+    with pytest.raises(InputError, match=r"give a number of W/\(m K\) from 1e-100 to|must be positive and finite"):
         effective_conductivity(medium_of(network, value))
 
 
