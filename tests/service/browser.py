@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import shutil
 import socket
 import subprocess
 import time
+import urllib.parse
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -41,6 +43,7 @@ class Browser:
             [DRIVER, f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         self._base = f"http://127.0.0.1:{port}"
+        self._host = ""
         self._wait_for_driver()
         flags = [*FLAGS, f"--window-size={width},{height}", f"--user-data-dir={folder / 'profile'}"]
         options = {"binary": CHROMIUM, "args": flags, "prefs": {"download.default_directory": str(folder)}}
@@ -66,6 +69,9 @@ class Browser:
             return json.load(answer)["value"]
 
     def open(self, url: str) -> None:
+        """Go to a page; what the console has of the page before is no longer of interest."""
+        self._ask("POST", "/se/log", {"type": "browser"})
+        self._host = urllib.parse.urlsplit(url).netloc
         self._ask("POST", "/url", {"url": url})
 
     def run(self, script: str, *arguments: Any) -> Any:
@@ -101,10 +107,15 @@ class Browser:
         return found
 
     def complaints(self) -> list[str]:
-        """What the console has of errors and warnings, refused requests of the tests' own excepted."""
+        """Errors and warnings in the console.
+
+        Refused requests of the tests' own are left out, and those of the page before to a service that has ended.
+        """
         entries = self._ask("POST", "/se/log", {"type": "browser"})
         found = [entry["message"] for entry in entries if entry["level"] in ("SEVERE", "WARNING")]
-        return [line for line in found if "status of 422" not in line and "status of 401" not in line]
+        ended = re.compile(rf"http://(?!{re.escape(self._host)}/)\S+ - .*net::ERR_CONNECTION_REFUSED")
+        own = [line for line in found if not ended.match(line)]
+        return [line for line in own if "status of 422" not in line and "status of 401" not in line]
 
     def picture(self, path: Path) -> None:
         path.write_bytes(base64.b64decode(self._ask("GET", "/screenshot")))

@@ -123,7 +123,10 @@ def test_uploads_count_before_they_are_read(tmp_path):
 
 @pytest.mark.slow
 def test_out_of_file_descriptors_is_one_line(tmp_path):
-    """With 40 descriptors and 300 clients; the service lives on and computes a study."""
+    """With 40 descriptors and 300 clients; the service lives on and computes a study.
+
+    The supervisor, which needs a descriptor for the queue, may add a line of its own.
+    """
     with Service(tmp_path / "data", slow=True) as service:
         resource.prlimit(service.process.pid, resource.RLIMIT_NOFILE, (40, 40))
         crowd = []
@@ -136,5 +139,7 @@ def test_out_of_file_descriptors_is_one_line(tmp_path):
         study = client.submit(service.server, STUDY)["id"]
         assert client.wait(service.server, study, interval=0.1)["state"] == "done"
         said = service.said().splitlines()
-    assert 1 <= len(said) <= 3, said
-    assert all("Too many open files" in line for line in said)
+    supervisor = [line for line in said if "supervisor: unable to open database file; trying again" in line]
+    connections = [line for line in said if "Too many open files" in line]
+    assert len(supervisor) <= 1 <= len(connections) <= 3, said
+    assert len(supervisor) + len(connections) == len(said), said
