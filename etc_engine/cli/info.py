@@ -79,14 +79,25 @@ def describe_particles(path: Path) -> dict[str, Any]:
 
 
 def _particles(path: Path) -> dict[str, Any]:
+    import numpy as np
+
     from etc_engine.box import AXES
     from etc_engine.particle_files.formats import read_rows
 
     rows = read_rows(path)
-    low, high = rows.positions.min(axis=0), rows.positions.max(axis=0)
-    found: dict[str, Any] = {
-        "particles": len(rows.radii),
-        "radii": [float(rows.radii.min()), float(rows.radii.max())],
+    sound = np.isfinite(rows.radii) & (rows.radii > 0.0) & np.isfinite(rows.positions).all(axis=1)
+    if not sound.any():
+        raise InputError(f"{path}: no particle has a finite centre and a finite, positive radius")
+    radii, positions = rows.radii[sound], rows.positions[sound]
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    found: dict[str, Any] = {"particles": len(rows.radii)}
+    if not sound.all():
+        found["unusable"] = (
+            f"{np.count_nonzero(~sound)} of {sound.size}, first particle {int(np.argmin(sound))}: a centre must be "
+            "finite, a radius finite and positive; the other commands refuse this file"
+        )
+    found |= {
+        "radii": [float(radii.min()), float(radii.max())],
         "centres": {AXES[k]: [float(low[k]), float(high[k])] for k in range(low.size)},
     }
     if rows.bounds is not None:
@@ -204,7 +215,7 @@ def _lines(found: dict[str, Any]) -> list[str]:
         if isinstance(value, dict):
             text = ", ".join(f"{name} {item}" for name, item in value.items())
         elif isinstance(value, (list, tuple)):
-            text = ", ".join(map(str, value))
+            text = ", ".join(map(str, value)) or "none"
         else:
             text = str(value)
         lines.append(f"{key:{WIDTH}} {text}")

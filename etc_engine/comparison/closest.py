@@ -94,8 +94,9 @@ def closest_words(comparison: xarray.Dataset) -> list[str]:
     if best:
         lines.append(f"closest model over the sweep: {described(best)}")
     elif attrs["best_model_note"]:
-        inside = attrs["within_error"].replace(" ", ", ")
-        found = f"{inside} agree with the simulation within its rms error of {error}; " if inside else ""
+        inside = attrs["within_error"].split()
+        verb = "agrees" if len(inside) == 1 else "agree"
+        found = f"{', '.join(inside)} {verb} with the simulation within its rms error of {error}; " if inside else ""
         lines.append(f"no closest model is named: {found}{attrs['best_model_note']}")
     if plain and plain != best:
         lines.append(f"closest of the models that know the solid fraction alone: {described(plain)}")

@@ -98,3 +98,17 @@ def test_a_picture_is_named_binary_without_its_bytes(etc_engine, tmp_path):
     assert "not in a known format: it is binary" in done.stderr
     assert done.stderr.rstrip("\n").isprintable()
     assert "x89" not in done.stderr
+
+
+def test_particles_that_cannot_be_used_are_counted(etc_engine, tmp_path):
+    path = tmp_path / "disks.csv"
+    path.write_text("x,y,radius\n0.1,0.2,0.1\n0.25,0.5,nan\n0.75,0.5,-1\n0.3,inf,0.1\n0.9,0.8,0.3\n")
+    found = json.loads(etc_engine("info", path, "--json").stdout)
+    assert found["particles"] == 5
+    assert found["unusable"].startswith("3 of 5, first particle 1: ")
+    assert found["radii"] == [0.1, 0.3]
+    assert found["centres"] == {"x": [0.1, 0.9], "y": [0.2, 0.8]}
+    path.write_text("x,y,radius\n0.25,0.5,nan\n")
+    done = etc_engine("info", path)
+    assert done.returncode == 2
+    assert "no particle has a finite centre and a finite, positive radius" in done.stderr
