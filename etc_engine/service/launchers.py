@@ -31,6 +31,8 @@ UNREACHABLE = (
     "temporarily unable",
 )
 """What commands of Slurm say when the controller, or munge, is down for a while."""
+HELD_BY_SLURM = ("launch failed", "jobholdmaxrequeue")
+"""Reasons for which Slurm itself holds a job, which then never starts: a node could not launch it."""
 RANKS_PER_CORE = 16
 """More ranks than this are a mistake: one per core is fastest."""
 HELD = 'ulimit -d "$1" 2>/dev/null; shift; exec "$@"'
@@ -43,9 +45,18 @@ class UnreachableError(OutputError):
 
 @dataclass(frozen=True)
 class Ended:
-    """A batch that has ended; ``status`` is its exit status where it can be known."""
+    """A batch that has ended.
+
+    Parameters
+    ----------
+    status : int, optional
+        Its exit status, where it can be known.
+    reason : str, optional
+        Why it was given up, if not by itself.
+    """
 
     status: int | None = None
+    reason: str = ""
 
 
 class Launcher(Protocol):
@@ -199,15 +210,19 @@ class SlurmLauncher:
         """Slurm forgets a job some minutes after its end, and then calls its number invalid.
 
         The exit status comes from the script of the job: it is there without accounting, and however late one looks.
+        A job that Slurm holds after a failed launch is cancelled and counts as ended: nobody would release it.
         """
         if not batch:
             return Ended()
         try:
-            found = self._ask(["squeue", "--noheader", f"--jobs={batch}", "--format=%T"])
+            found = self._ask(["squeue", "--noheader", f"--jobs={batch}", "--format=%T %r"])
         except UnreachableError:
             return None
         except OutputError as error:
             return Ended(self._status(study)) if "invalid job id" in str(error).lower() else None
+        if any(words in found.lower() for words in HELD_BY_SLURM):
+            self.stop(study, batch)
+            return Ended(reason=f"Slurm holds its job: {found.strip().partition(' ')[2]}")
         return None if found.strip() else Ended(self._status(study))
 
     def stop(self, study: str, batch: str) -> None:  # noqa: ARG002 - the protocol's signature

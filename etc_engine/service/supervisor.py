@@ -208,7 +208,8 @@ class Supervisor:
                 self._queue.settle(entry.id, "failed", said)
             else:
                 code = "" if ended.status is None else f" with status {ended.status}"
-                self._try_again(self._queue.require(entry.id), said or f"its batch ended{code}, see the log")
+                reason = ended.reason or said or f"its batch ended{code}, see the log"
+                self._try_again(self._queue.require(entry.id), reason)
         return True
 
     def _finish(self, entry: Entry, watch: _Watch) -> bool:

@@ -34,13 +34,18 @@ echo "$n;cluster"
 SQUEUE = """for word; do case "$word" in --jobs=*) job=${word#*=};; --name=*) name=${word#*=};; esac; done
 [ -e "$SITE/down" ] && { echo 'slurm_load_jobs error: Unable to contact slurm controller' >&2; exit 1; }
 if [ -n "$job" ]; then
-    [ -e "$SITE/job.$job" ] && echo RUNNING && exit
+    [ -e "$SITE/held.$job" ] && echo "PENDING $(cat "$SITE/held.$job")" && exit
+    [ -e "$SITE/job.$job" ] && echo RUNNING None && exit
     echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1
 fi
 for file in "$SITE"/job.*; do
     [ -e "$file" ] && read -r pid found dir < "$file" && [ "$found" = "$name" ] && echo "${file##*.} $dir"
 done
 exit 0
+"""
+SCANCEL = """echo "scancel $*" >> "$SITE/calls"
+read -r pid rest < "$SITE/job.$1" && kill -- "-$pid"
+rm -f "$SITE/held.$1" "$SITE/job.$1"
 """
 
 
@@ -51,7 +56,7 @@ def site(tmp_path):
     programs.mkdir()
     engine = f'exec {sys.executable} {SLOW_ENGINE} "$@"\n'
     launcher = 'while [ "$1" != etc-engine ]; do shift; done\nshift\nexec etc-engine "$@"\n'
-    commands = {"sbatch": SBATCH, "squeue": SQUEUE, "scancel": "exit 1\n", "srun": launcher, "scontrol": "exit 1\n"}
+    commands = {"sbatch": SBATCH, "squeue": SQUEUE, "scancel": SCANCEL, "srun": launcher, "scontrol": "exit 1\n"}
     for name, text in {**commands, "etc-engine": engine}.items():
         (programs / name).write_text("#!/bin/bash\n" + text)
         (programs / name).chmod(0o755)
@@ -117,6 +122,38 @@ def test_a_silent_controller_is_waited_for_and_a_refusal_is_told(site):
         ended = client.wait(service.server, refused, interval=0.1)
         assert ended["state"] == "failed"
         assert "QOSMaxSubmitJobPerUserLimit" in ended["reason"]
+
+
+def test_a_job_that_slurm_holds_is_cancelled_and_submitted_again(site):
+    """A node that still knows the job cannot launch it: Slurm holds it, and it would wait for ever."""
+    (site / "held.101").write_text("launch failed requeued held")
+    with cluster(site) as service:
+        study = client.submit(service.server, STUDY)["id"]
+        ended = client.wait(service.server, study, interval=0.1)
+        assert (ended["state"], ended["done"]) == ("done", 6), ended
+    assert calls(site, "scancel") == ["scancel 101"]
+
+
+def test_a_study_whose_jobs_are_all_held_fails_with_the_reason(site):
+    for job in range(101, 110):
+        (site / f"held.{job}").write_text("launch failed requeued held")
+    (site / "bin" / "etc-engine").write_text("#!/bin/sh\nsleep 1000\n")
+    with cluster(site) as service:
+        study = client.submit(service.server, STUDY)["id"]
+        ended = client.wait(service.server, study, interval=0.1)
+    assert (ended["state"], ended["reason"]) == ("failed", "Slurm holds its job: launch failed requeued held"), ended
+    assert len(calls(site, "sbatch")) == 3
+
+
+def test_a_job_that_its_user_holds_is_left_alone(site):
+    (site / "held.101").write_text("JobHeldUser")
+    with cluster(site, "0.3") as service:
+        study = client.submit(service.server, STUDY)["id"]
+        until((service.data / "studies" / study / "result.nc").exists)
+        assert client.status(service.server, study)["state"] == "running"
+        (site / "held.101").unlink()
+        assert client.wait(service.server, study, interval=0.1)["state"] == "done"
+    assert len(calls(site, "sbatch")) == 1
 
 
 @pytest.mark.parametrize(("status", "starts"), [(2, 1), (1, 3)])
