@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from etc_engine import (
     Box,
@@ -31,11 +30,12 @@ from etc_engine.engines.dtem.model_error import chord_error_estimate, chord_erro
 from etc_engine.errors import GeometryError
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, TEXT, legend, mark_outside, new_panels, save
 
 HERE = Path(__file__).parent
 SEED = 4201
 METHODS = ("standard", "enhanced", "arc", "chord")
-COLOURS = {"standard": "#b2182b", "enhanced": "#ef8a62", "arc": "#7f7f7f", "chord": "#2166ac", "estimate": "k"}
+SHADES = dict(zip(METHODS, COLOURS, strict=False)) | {"estimate": INK}
 MODES = 5
 HEIGHT = np.sqrt(3.0)
 
@@ -140,38 +140,38 @@ def write(path: Path, header: list[str], rows: list[list[object]]) -> None:
 
 
 def draw_map(rows: list[dict], path: Path) -> None:
-    figure = Figure(figsize=(13.0, 4.4), layout="constrained")
     panels = list(dict.fromkeys(row["panel"] for row in rows))
-    for axes, panel in zip(figure.subplots(1, 3, sharey=True), panels, strict=True):
+    figure, places = new_panels(1, len(panels), 4.6, sharey=True)
+    for axes, panel in zip(places, panels, strict=True):
+        axes.set(xscale="log", yscale="log", xlim=(0.8, 70.0), ylim=(1e-7, 1.0))
         chosen = [row for row in rows if row["panel"] == panel]
-        for name, marker in zip(dict.fromkeys(row["name"] for row in chosen), "osD^vPX*<>", strict=False):
+        for name, marker in zip(dict.fromkeys(row["name"] for row in chosen), (*MARKERS, "<", ">"), strict=False):
             mine = sorted((row for row in chosen if row["name"] == name), key=lambda row: row["degrees"])
             for method in (*METHODS, "estimate"):
-                axes.loglog(
-                    [row["degrees"] for row in mine],
-                    [abs(row[method]) for row in mine],
+                degrees, errors = [row["degrees"] for row in mine], [abs(row[method]) for row in mine]
+                axes.plot(
+                    degrees,
+                    errors,
                     marker=marker if method != "estimate" else "none",
                     ms=3.5,
                     lw=0.9,
                     ls=(":" if method == "estimate" else "-") if len({row["degrees"] for row in mine}) > 4 else "none",
-                    color=COLOURS[method],
+                    color=SHADES[method],
                 )
-            axes.plot([], [], marker=marker, ls="none", color="0.5", ms=4, label=name)
-        axes.set(title=panel, xlabel="contact half-angle [degrees]", ylim=(1e-7, 1.0))
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=6, loc="lower right")
-    axes = figure.axes[0]
-    axes.set_ylabel("error of the conductivity against exact")
-    names = [axes.plot([], [], color=COLOURS[m], ls=":" if m == "estimate" else "-")[0] for m in COLOURS]
+                mark_outside(axes, degrees, errors, SHADES[method])
+        axes.set_title(panel, fontsize=TEXT)
+        axes.set_xlabel("contact half-angle [degrees]")
+    axes = places[0]
+    axes.set_ylabel("error of the conductivity against exact [-]")
+    names = [axes.plot([], [], color=SHADES[m], ls=":" if m == "estimate" else "-")[0] for m in SHADES]
     labels = [*METHODS, "estimate for chord"]
-    figure.legend(names, labels, loc="outside lower center", ncols=5, fontsize=8)
-    figure.savefig(path, dpi=140)
+    legend(figure, names, labels, loc="outside upper center", ncols=5)
+    save(figure, path)
 
 
 def draw_estimate(rows: list[dict], path: Path) -> None:
-    figure = Figure(figsize=(5.2, 4.8), layout="constrained")
-    axes = figure.subplots()
-    for panel, marker in (("isolated pairs", "^"), ("lattices", "s"), ("random packings", "o")):
+    figure, (axes,) = new_panels(height=5.0)
+    for k, (panel, marker) in enumerate((("isolated pairs", "^"), ("lattices", "s"), ("random packings", "o"))):
         for fitted in (1, 0):
             mine = [row for row in rows if row["panel"] == panel and row["fitted"] == fitted]
             axes.loglog(
@@ -180,15 +180,16 @@ def draw_estimate(rows: list[dict], path: Path) -> None:
                 marker,
                 ms=4,
                 mfc="none" if fitted else None,
-                color={"isolated pairs": "#1b7837", "lattices": "#b2182b", "random packings": "#2166ac"}[panel],
+                color=COLOURS[k],
                 label=panel + (" (fitted)" if fitted else " (not fitted)") if mine else None,
             )
     line = np.array([1e-7, 0.3])
-    axes.loglog(line, line, "k-", lw=0.8)
-    axes.loglog(line, 3 * line, "k:", lw=0.8, label="estimate = 3 x error")
-    axes.set(xlabel="error of chord against exact", ylabel="estimate", xlim=line, ylim=line)
-    axes.legend(fontsize=7)
-    figure.savefig(path, dpi=140)
+    axes.loglog(line, line, "-", color=INK, lw=0.8, label="estimate = error")
+    axes.loglog(line, 3 * line, ":", color=INK, lw=0.8, label="estimate = 3 x error")
+    axes.set(xlabel="error of chord against exact [-]", ylabel="estimate [-]", xlim=line, ylim=line)
+    mark_outside(axes, [abs(row["chord"]) for row in rows], [row["estimate"] for row in rows], GREY)
+    legend(axes)
+    save(figure, path)
 
 
 def bounds(output: Path) -> None:
@@ -207,9 +208,8 @@ def bounds(output: Path) -> None:
     }
     modes = range(1, 9)
     rows = []
-    figure = Figure(figsize=(5.6, 4.4), layout="constrained")
-    axes = figure.subplots()
-    for (name, network), marker in zip(networks.items(), "osD^v", strict=True):
+    figure, (axes,) = new_panels(height=4.4)
+    for (name, network), marker in zip(networks.items(), MARKERS, strict=False):
         pairs = []
         for m in modes:
             result = effective_conductivity(medium_of(network), method="exact", modes=m, axes=(0,))
@@ -217,10 +217,9 @@ def bounds(output: Path) -> None:
             pairs.append((low, high))
             rows.append([name, m, f"{low:.10f}", f"{high:.10f}", high / low - 1.0])
         axes.semilogy(modes, [high / low - 1.0 for low, high in pairs], marker=marker, ms=4, label=name)
-    axes.set(xlabel="flux modes a contact", ylabel="upper bound / lower bound - 1")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
-    figure.savefig(output / "bounds.png", dpi=140)
+    axes.set(xlabel="flux modes per contact", ylabel="upper bound over lower bound - 1 [-]")
+    legend(axes)
+    save(figure, output / "bounds.png")
     write(output / "bounds.csv", ["name", "modes", "lower", "upper", "relative_distance"], rows)
 
 

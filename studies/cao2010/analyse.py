@@ -6,9 +6,9 @@ import csv
 import warnings
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import reference as paper
+from matplotlib.ticker import MaxNLocator
 
 from etc_engine.engines.meshless import (
     ContactArc,
@@ -20,8 +20,10 @@ from etc_engine.engines.meshless import (
     solve_transient,
 )
 from etc_engine.errors import ConvergenceError
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, TEXT, WIDE, legend, new_figure, new_panels, save
 
 HERE = Path(__file__).resolve().parent
+NAMES = {"trefftz": "Trefftz functions", "mfs": "fundamental solutions (MFS)"}
 SCHEMES = ("backward-euler", "crank-nicolson", "bdf2", "sdirk2")
 RIGHT, PRINTED = (1.2, 24), (1.25, 25)  # (time, backward Euler steps of 0.05): asked for, and what was done
 
@@ -31,11 +33,6 @@ def write_table(name: str, header: list[str], rows: list[list]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([[f"{v:.6g}" if isinstance(v, float) else v for v in row] for row in rows])
-
-
-def save(figure: plt.Figure, name: str) -> None:
-    figure.savefig(HERE / f"{name}.png", dpi=90)
-    plt.close(figure)
 
 
 def coarse(number: int, basis, method: str, when: tuple[float, int]) -> np.ndarray:
@@ -149,30 +146,29 @@ def reach() -> None:
 def figure_time_step() -> None:
     counts = np.array([12, 24, 48, 96, 192, 384])
     rows = []
-    figure, axes = plt.subplots(figsize=(6.4, 4.6), layout="constrained")
-    for scheme in SCHEMES:
+    figure, (axes,) = new_panels(height=4.4)
+    for scheme, marker in zip(SCHEMES, MARKERS, strict=False):
         errors = [
             paper.relative_error(fine(1, paper.POINTS_1, 1.2, scheme=scheme, steps=int(n)),
                                  paper.exact_1(paper.POINTS_1, 1.2)) for n in counts
         ]  # fmt: skip
-        axes.loglog(1.2 / counts, errors, "o-", label=scheme)
+        axes.loglog(1.2 / counts, errors, marker=marker, markersize=4, label=scheme)
         rows += [[scheme, int(n), 1.2 / n, e] for n, e in zip(counts, errors, strict=True)]
     steps = 1.2 / counts
-    axes.loglog(steps, 3.0 * steps, "k:", lw=1, label="order 1")
-    axes.loglog(steps, 1.0 * steps**2, "k--", lw=1, label="order 2")
-    axes.set(xlabel="time step [s]", ylabel="relative error at t = 1.2 s", title="Example 1: error over time step")
-    axes.legend()
-    axes.grid(alpha=0.3)
-    save(figure, "error_over_time_step")
+    axes.loglog(steps, 3.0 * steps, ":", color=INK, lw=1, label="order 1")
+    axes.loglog(steps, 1.0 * steps**2, "--", color=INK, lw=1, label="order 2")
+    axes.set(xlabel="time step [s]", ylabel="relative error at t = 1.2 s [-]")
+    legend(axes)
+    save(figure, HERE / "error_over_time_step.png")
     write_table("error_over_time_step", ["scheme", "steps", "time step", "relative error"], rows)
 
 
 def figure_condition() -> None:
     """Number of functions on 160 boundary nodes: condition number and error, Laplace inversion."""
     counts = [10, 20, 30, 40, 60, 80, 100, 120, 140, 160]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4.0), layout="constrained")
+    figure, (left, right) = new_panels(1, 2)
     rows = []
-    for method in ("trefftz", "mfs"):
+    for method, marker in zip(("trefftz", "mfs"), MARKERS, strict=False):
         conditions, errors, used = [], [], []
         for count in counts:
             result = solve_transient(
@@ -183,26 +179,37 @@ def figure_condition() -> None:
             conditions.append(result.attrs["boundary_condition_number"])
             errors.append(paper.relative_error(result.temperature.values[0], paper.exact_1(paper.POINTS_1, 1.2)))
             rows.append([method, used[-1], conditions[-1], result.attrs["boundary_rank"], errors[-1]])
-        left.semilogy(used, conditions, "o-", label=method)
-        right.semilogy(used, errors, "o-", label=method)
-    left.set(xlabel="functions m (160 collocation points)", ylabel="condition number of the boundary system")
-    right.set(xlabel="functions m (160 collocation points)", ylabel="relative error at t = 1.2 s")
+        left.semilogy(used, conditions, marker=marker, markersize=4, label=NAMES[method])
+        right.semilogy(used, errors, marker=marker, markersize=4, label=NAMES[method])
+    left.set(xlabel="functions m (160 collocation points)", ylabel="condition number of the boundary system [-]")
+    right.set(xlabel="functions m (160 collocation points)", ylabel="relative error at t = 1.2 s [-]")
     for axes in (left, right):
-        axes.grid(alpha=0.3)
-        axes.legend()
-    save(figure, "condition_number")
+        legend(axes)
+    save(figure, HERE / "condition_number.png")
     write_table("condition_number", ["method", "functions", "condition number", "rank", "relative error"], rows)
 
 
+def finish(panel, image, words: str, title: str) -> None:
+    """Titles and scale of one map."""
+    bar = panel.figure.colorbar(image, ax=panel, orientation="horizontal")
+    bar.set_label(words, fontsize=TEXT)
+    bar.locator = MaxNLocator(4)
+    bar.ax.tick_params(labelsize=TEXT)
+    panel.set(aspect="equal")
+    for name, place in ((title, panel.set_title), ("x [m]", panel.set_xlabel), ("y [m]", panel.set_ylabel)):
+        place(name, fontsize=TEXT)
+    panel.tick_params(labelsize=TEXT)
+
+
 def figure_maps() -> None:
-    figure, axes = plt.subplots(1, 3, figsize=(12.5, 3.9), layout="constrained")
+    figure = new_figure(WIDE, 3.0)
+    axes = figure.subplots(1, 3)
     s = np.linspace(0.0, 3.0, 61)
     square = np.array([(a, b) for b in s for a in s])
     for panel, number in zip(axes[:2], (1, 2), strict=True):
         field = fine(number, square, 1.2, steps=192).reshape(61, 61)
         image = panel.contourf(s, s, field, 20, cmap="inferno")
-        figure.colorbar(image, ax=panel, label="temperature [°C]")
-        panel.set(title=f"Example {number}, t = 1.2 s", xlabel="x [m]", ylabel="y [m]", aspect="equal")
+        finish(panel, image, "temperature [°C]", f"Example {number}, t = 1.2 s")
     s = np.linspace(-1.0, 1.0, 61)
     grid = np.array([(a, b) for b in s for a in s])
     body = ~((grid[:, 0] > 1e-9) & (grid[:, 1] > 1e-9))
@@ -210,9 +217,8 @@ def figure_maps() -> None:
     field[body] = fine(3, grid[body], 1.0, steps=50) - paper.exact_3(grid[body], 1.0)
     size = np.abs(paper.exact_3(grid[body], 1.0)).max()
     image = axes[2].contourf(s, s, field.reshape(61, 61) / size * 1e4, 20, cmap="coolwarm")
-    figure.colorbar(image, ax=axes[2], label="error / largest temperature [1e-4]")
-    axes[2].set(title="Example 3: error at t = 1 s", xlabel="x [m]", ylabel="y [m]", aspect="equal")
-    save(figure, "temperature_maps")
+    finish(axes[2], image, "error over largest temperature [1e-4]", "Example 3, t = 1 s")
+    save(figure, HERE / "temperature_maps.png")
 
 
 def figure_contact_arcs() -> None:
@@ -225,30 +231,28 @@ def figure_contact_arcs() -> None:
         "three contacts, unequal": ([0, 110, 230], [1.0, 0.4, -0.6]),
     }
     fourier = np.geomspace(0.01, 2.0, 16)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.2), layout="constrained")
+    figure, (left, right) = new_panels(1, 2, 4.2)
     rows = []
-    for color, (name, (angles, heat)) in enumerate(cases.items()):
+    for colour, marker, (name, (angles, heat)) in zip(COLOURS, MARKERS, cases.items(), strict=False):
         arcs = [ContactArc(angle * degree, 10 * degree) for angle in angles]
         result = heat_disk_through_arcs(arcs, heat, fourier, scheme="laplace")
         rise = (result.arc_temperature - result.mean_temperature).values
         lumped = (result.lumped_arc_temperature - result.mean_temperature).values
         gap = np.abs(rise - lumped).max(axis=1) / np.abs(lumped).max(axis=1)
-        left.semilogx(fourier, rise[:, 0], "o-", ms=3, color=f"C{color}", label=name)
-        left.axhline(lumped[0, 0], color=f"C{color}", ls=":", lw=1)
-        right.loglog(fourier, gap, "o-", ms=3, color=f"C{color}", label=name)
+        left.semilogx(fourier, rise[:, 0], marker=marker, ms=3, color=colour, label=name)
+        left.axhline(lumped[0, 0], color=colour, ls=":", lw=1)
+        right.loglog(fourier, gap, marker=marker, ms=3, color=colour)
         drift = float(np.abs(result.mean_temperature.values - sum(heat) * fourier / np.pi).max())
         below = fourier[gap < 0.01]
         within = float(np.exp(np.interp(-np.log(0.01), -np.log(gap), np.log(fourier)))) if len(below) else np.nan
         rows.append([name, float(lumped[0, 0]), float(rise[-1, 0]), within, drift])
-    right.axhline(0.01, color="k", lw=0.8, ls="--")
-    left.set(xlabel="Fourier number  κt/(ρc R²)", ylabel="(T₁ − T₀) κ / (1 W/m)")
-    left.set_title("rise of the first arc over the mean (dotted: lumped)", fontsize=10)
-    right.set(xlabel="Fourier number  κt/(ρc R²)", ylabel="largest gap / largest lumped rise")
-    right.set_title("error of the lumped relation", fontsize=10)
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    left.legend(fontsize=8)
-    save(figure, "contact_arcs")
+    right.axhline(0.01, color=INK, lw=0.8, ls="--", label="1 %")
+    left.set(xlabel="Fourier number  κt/(ρc R²)", ylabel="(T₁ − T₀) κ/(1 W/m) [-]")
+    left.set_title("first arc above the mean (dotted: lumped)", fontsize=TEXT)
+    right.set(xlabel="Fourier number  κt/(ρc R²)", ylabel="largest gap over largest lumped rise [-]")
+    right.set_title("error of the lumped relation", fontsize=TEXT)
+    legend(figure, loc="outside upper center", ncols=3)
+    save(figure, HERE / "contact_arcs.png")
     header = [
         "case",
         "lumped rise of arc 1",

@@ -12,7 +12,8 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, legend, new_panels, save
 
 SMALL = 0.2  # [degree] up to here the law is fitted
 C = {"standard": 1.5, "chord": np.log(4.0), "arc": np.log(4.0)}
@@ -44,25 +45,25 @@ def main(result: str = "out.nc", picture: str = "figure.png") -> None:
     ratio = mean.sel({"method": "chord"}) / mean_field
     print(f"chord over contact mean field: {float(ratio.min()):.4f} to {float(ratio.max()):.4f}")
 
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for i, method in enumerate(data["method"].values):
-        cell = mean.sel({"method": method})
-        left.plot(data["contact_angle"], cell, marker="osD^v"[i % 5], markersize=4, label=str(method))
-        right.plot(log, 1.0 / cell, marker="osD^v"[i % 5], markersize=4, linestyle="none", label=str(method))
-    left.plot(data["contact_angle"], mean_field, "k--", linewidth=0.9, label="contact mean field")
+    figure, (left, right) = new_panels(1, 2)
+    for method, colour, marker in zip(data["method"].values, COLOURS, MARKERS, strict=False):
+        cell, look = mean.sel({"method": method}), {"color": colour, "marker": marker, "markersize": 4}
+        left.plot(data["contact_angle"], cell, label=str(method), **look)
+        right.plot(log, 1.0 / cell, linestyle="none", **look)
+    left.plot(data["contact_angle"], mean_field, "--", color=INK, linewidth=0.9, label="contact mean field")
     slope, intercept = np.polyfit(log[small], (1.0 / mean.sel({"method": "chord"}))[small], 1)
-    right.plot(log, slope * log + intercept, "k-", linewidth=0.8, label=f"line through chord, up to {SMALL:g}°")
+    right.plot(
+        log, slope * log + intercept, "-", color=INK, linewidth=0.8, label=f"line through chord, up to {SMALL:g}°"
+    )
     left.set_xscale("log")
     left.set_ylim(bottom=0.0)
     left.set_xlabel("contact half-angle [degree]")
     left.set_ylabel("conductivity [W m$^{-1}$ K$^{-1}$]")
     right.set_xlabel("ln 1/α [-]")
     right.set_ylabel("1/k [m K W$^{-1}$]")
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-        axes.legend(frameon=False, fontsize=8)
-    figure.savefig(picture, dpi=130)
+    legend(left)
+    legend(right)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

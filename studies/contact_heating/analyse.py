@@ -21,7 +21,7 @@ from etc_engine.medium.medium import medium_of
 from etc_engine.medium.sides import contact_sides
 from etc_engine.medium.transient import ParticleSystem, particle_sides
 from etc_engine.medium.walls import FixedTemperature
-from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, TEXT, legend, mark_outside, new_panels, save
 from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import march
 
@@ -131,8 +131,8 @@ def deviations(found: Inside) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def draw(path: Path, results: dict[tuple[str, str], Inside]) -> None:
     """Temperatures by the finest model, and the errors of all models; a row for each disk."""
-    figure = new_figure(10.5, 6.6)
-    grid = figure.subplots(2, 2)
+    figure, panels = new_panels(2, 2, 4.4)
+    grid = panels.reshape(2, 2)
     for row, place in zip(grid, dict.fromkeys(place for place, _ in results), strict=True):
         found = results[place, "standard with dipoles"]
         row[0].plot(FOURIER, found.true_mean, color=INK, linewidth=2.0, label="true mean")
@@ -140,24 +140,27 @@ def draw(path: Path, results: dict[tuple[str, str], Inside]) -> None:
             colour = COLOURS[k % len(COLOURS)]
             row[0].plot(FOURIER, found.true_contacts[:, k], color=colour, linewidth=1.2, label=f"contact {k + 1}, true")
             row[0].plot(FOURIER, found.contacts[:, k], "--", color=colour, linewidth=1.0)
-        row[0].set_title(f"disk {place} (dashed: contact by the model)", fontsize=10, loc="left")
-        row[0].set_ylabel("temperature [K]", fontsize=9)
+        row[0].set_title(f"disk {place} (dashed: contact by the model)", fontsize=TEXT)
+        row[0].set_ylabel("temperature [K]")
         row[0].set_xscale("log")
         for k, model in enumerate(MODELS):
             mean, contact, _ = deviations(results[place, model])
             look = {"color": COLOURS[k], "marker": MARKERS[k], "markersize": 3, "linewidth": 1.0}
-            row[1].loglog(FOURIER, contact, label=f"contacts, {model}", **look)
-            row[1].loglog(FOURIER, mean, color=COLOURS[k], linestyle=":", linewidth=1.0)
+            row[1].set(xscale="log", yscale="log", ylim=(1e-8, 2.0), xlim=row[0].get_xlim())
+            row[1].plot(FOURIER, contact, label=f"contacts, {model}", **look)
+            mark_outside(row[1], FOURIER, mean, COLOURS[k])
+            mark_outside(row[1], FOURIER, contact, COLOURS[k])
+            row[1].plot(FOURIER, mean, color=COLOURS[k], linestyle=":", linewidth=1.0)
         away = deviations(results[place, "standard with dipoles"])[2]
-        row[1].loglog(FOURIER, away, color=INK, linewidth=1.6, label="farthest contact from the true mean")
-        row[1].set_title("largest error of a contact, and (dotted) of the mean", fontsize=10, loc="left")
-        row[1].set_ylabel("error, wall stepped by 1 K [K]", fontsize=9)
-        row[1].set_ylim(2e-6, 2.0)
+        row[1].plot(FOURIER, away, color=INK, linewidth=1.6, label="farthest contact from the true mean")
+        row[1].set_title("error of contacts, and (dotted) of the mean", fontsize=TEXT)
+        row[1].set_ylabel("largest error, wall stepped by 1 K [K]")
         for axes in row:
-            style(axes)
-            axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$", fontsize=9)
-        row[0].legend(fontsize=7.5, frameon=False)
-    grid[0, 1].legend(fontsize=7.5, frameon=False, loc="lower left")
+            axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$ [-]")
+    names: dict[str, object] = {}
+    for axes in grid[0]:
+        names |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    legend(figure, list(names.values()), list(names), loc="outside upper center", ncols=3)
     save(figure, path)
 
 

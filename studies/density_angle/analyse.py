@@ -9,7 +9,8 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, legend, new_panels, save
 
 
 def maxwell(solid: xr.DataArray, pores: float, fraction: xr.DataArray) -> xr.DataArray:
@@ -51,23 +52,24 @@ def main(result: str = "out.nc", picture: str = "collapse.png") -> None:
             print(f"{density:8.3f}{row}")
 
     sem = k.std("realization", ddof=1) / np.sqrt(k.notnull().sum("realization"))
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for i, angle in enumerate(data["contact_angle"].values):
-        for j, pores in enumerate(data["pore_conductivity"].values):
+    figure, (left, right) = new_panels(1, 2)
+    lines = ("-", "--", ":", "-.")
+    for angle, colour, marker in zip(data["contact_angle"].values, COLOURS, MARKERS, strict=False):
+        look = {"color": colour, "marker": marker, "markersize": 4}
+        for pores, line in zip(data["pore_conductivity"].values, lines, strict=False):
             cell = mean.sel(contact_angle=angle, pore_conductivity=pores)
             error = sem.sel(contact_angle=angle, pore_conductivity=pores)
-            style = {"marker": "osD^v<>P"[i % 8], "color": f"C{i}", "linestyle": ("-", "--", ":", "-.")[j % 4]}
-            left.errorbar(data["density"], cell, error, capsize=2, label=f"{angle:g}°, {pores:g}", **style)
-        right.plot(data["density"], ratio.sel(contact_angle=angle), marker="osD^v<>P"[i % 8], label=f"{angle:g}°")
+            left.errorbar(data["density"], cell, error, capsize=2, linestyle=line, **look)
+        right.plot(data["density"], ratio.sel(contact_angle=angle), label=f"half-angle {angle:g}°", **look)
+    for pores, line in zip(data["pore_conductivity"].values, lines, strict=False):
+        left.plot([], [], line, color=INK, label=f"pores {pores:g} W/(m K)" if pores else "insulating pores")
     left.set_ylabel("conductivity [W m$^{-1}$ K$^{-1}$]")
     right.set_ylabel("conductivity over contact mean field [-]")
     for axes in (left, right):
         axes.set_xlabel("density [-]")
         axes.set_ylim(bottom=0.0)
-        axes.grid(alpha=0.3)
-    left.legend(title="half-angle, pores", frameon=False, fontsize=8)
-    figure.savefig(picture, dpi=130)
+    legend(figure, loc="outside upper center", ncols=3)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,11 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from etc_engine import Box, PackingSpec, pack, parse_radii
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.rules import coordination_contacts
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, legend, new_panels, save
 from etc_engine.transient.diffusivity import WINDOW, Diffusivity, effective_diffusivity, slab_mean
 
 HERE = Path(__file__).parent
@@ -75,27 +75,27 @@ def summary(count: int, sample: list[Pair]) -> dict[str, float]:
 
 def draw(found: dict[int, list[Pair]], path: Path) -> None:
     """Warming curves on the slab's, and the difference over size."""
-    figure = Figure(figsize=(9.0, 3.7), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     fine = np.geomspace(2e-3, 2.0, 200)
-    colours = ("tab:grey", "tab:blue", "tab:green", "tab:orange", "tab:red")
-    for (count, sample), colour in zip(found.items(), colours, strict=False):
-        one = sample[0][0]
-        left.plot(one.transient * one.times, one.means, ".", color=colour, markersize=4, label=f"{count} disks")
-    left.plot(fine, slab_mean(fine), "k-", linewidth=0.8, label="slab, exact")
-    left.axhspan(*WINDOW, color="0.93", zorder=0)
-    left.set(xscale="log", xlabel="Fourier number with the fitted diffusivity", ylabel="mean temperature")
-    left.set_xlim(2e-3, 2.0)
-    left.legend(fontsize=8)
+    for (count, sample), colour, marker in zip(found.items(), COLOURS, MARKERS, strict=False):
+        curve = sample[0][0]
+        fourier = curve.transient * curve.times
+        seen = (fourier >= fine[0]) & (fourier <= fine[-1])
+        look = {"color": colour, "marker": marker, "markersize": 3, "linestyle": "none"}
+        left.plot(fourier[seen], curve.means[seen], label=f"{count} disks", **look)
+    left.plot(fine, slab_mean(fine), "-", color=INK, linewidth=0.8, label="slab, exact")
+    left.axhspan(*WINDOW, color="0.95", zorder=0, label="fitted")
+    left.set(xscale="log", xlabel="Fourier number with the fitted diffusivity [-]", ylabel="mean temperature [-]")
+    legend(left)
     rows = [summary(count, sample) for count, sample in found.items()]
     size = np.array([row["particles"] for row in rows])
     mean = np.array([row["difference_percent"] for row in rows])
     spread = np.array([row["difference_spread_percent"] for row in rows])
     right.errorbar(size, mean, 2.0 * np.array([row["difference_sem_percent"] for row in rows]), fmt="o", markersize=4)
-    right.fill_between(size, mean - spread, mean + spread, color="tab:blue", alpha=0.15)
-    right.axhline(0.0, color="black", linewidth=0.6)
+    right.fill_between(size, mean - spread, mean + spread, color=COLOURS[0], alpha=0.15)
+    right.axhline(0.0, color=INK, linewidth=0.6)
     right.set(xscale="log", xlabel="disks", ylabel="transient over steady diffusivity - 1 [%]")
-    figure.savefig(path, dpi=110)
+    save(figure, path)
 
 
 def main() -> None:

@@ -20,6 +20,7 @@ from etc_engine.engines.dtem.conductivity import conductivity_bounds
 from etc_engine.engines.voxel import Scheme, solve_cell, voxelize
 from etc_engine.medium.medium import Medium, Pores, medium_of
 from etc_engine.medium.network import ContactNetwork
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, TEXT, WIDE, legend, new_figure, save, style
 
 HERE = Path(__file__).parent
 SEED = 5107
@@ -27,8 +28,8 @@ COUNT, DENSITY, GROWTH = 30, 0.83, 1.03
 HALF_ANGLE = np.radians(11.0)
 RESOLUTIONS = (48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 1536, 2048)
 KINDS = {
-    "binary": ("#d55e00", "s", "binary voxels"),
-    "laminate": ("#0072b2", "o", "voxels of mean conductivity"),
+    "binary": (COLOURS[1], "s", "binary voxels"),
+    "laminate": (COLOURS[0], "o", "voxels of mean conductivity"),
 }
 
 
@@ -99,22 +100,21 @@ def draw_contact(axes, packing: ParticlePacking, network: ContactNetwork, n: int
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
     for shift in np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2):
         for center, size in zip(packing.centers + shift, packing.radii, strict=True):
-            axes.plot(
-                center[0] + size * np.cos(angle), center[1] + size * np.sin(angle), color="#222222", linewidth=0.8
-            )
+            axes.plot(center[0] + size * np.cos(angle), center[1] + size * np.sin(angle), color=INK, linewidth=0.8)
     axes.set_xlim(middle[0] - reach, middle[0] + reach)
     axes.set_ylim(middle[1] - reach, middle[1] + reach)
     axes.set_xticks([])
     axes.set_yticks([])
-    axes.set_title(f"{n} × {n} voxels", fontsize=9)
+    axes.set_title(f"{n} × {n} voxels", fontsize=TEXT)
 
 
 def draw(packing: ParticlePacking, network: ContactNetwork, found: dict[str, float], rows: list) -> Figure:
-    figure = Figure(figsize=(9.5, 5.4), layout="constrained")
+    figure = new_figure(WIDE, 5.2)
     left, right = figure.subfigures(1, 2, width_ratios=(1, 2.4))
     for axes, n in zip(left.subplots(2, 1), (96, 384), strict=True):
         draw_contact(axes, packing, network, n)
     axes = right.subplots()
+    style(axes)
     for name, fill in (("packing", "full"), ("square", "none")):
         for kind, (colour, marker, label) in KINDS.items():
             chosen = [row for row in rows if row["voxels"] == kind and row["geometry"] == name]
@@ -132,20 +132,17 @@ def draw(packing: ParticlePacking, network: ContactNetwork, found: dict[str, flo
                 markersize=5,
                 label=f"{what}, {label}",
             )
-    for name, style in (("standard", ":"), ("enhanced", "-."), ("chord", (0, (8, 2)))):
+    for name, line in (("standard", ":"), ("enhanced", "-."), ("chord", (0, (8, 2)))):
         error = 100.0 * (found[name] / found["exact"] - 1.0)
-        axes.axhline(
-            error, color="#8a8a8a", linestyle=style, linewidth=1.0, label=f"DTEM {name}, packing: {error:+.2f} %"
-        )
-    axes.axhline(0.0, color="k", linewidth=1.0, label="DTEM exact")
+        axes.axhline(error, color=GREY, linestyle=line, linewidth=1.0, label=f"elements, {name}: {error:+.2f} %")
+    axes.axhline(0.0, color=INK, linewidth=1.0, label="elements, exact")
     axes.set_xscale("log")
     axes.set_yscale("symlog", linthresh=1.0)
     axes.set_yticks([-5, -1, 0, 1, 5, 10, 50], ["-5", "-1", "0", "1", "5", "10", "50"])
     axes.set_ylim(-12, 110)
-    axes.set_xlabel("voxels across a disk")
+    axes.set_xlabel("voxels across a disk [-]")
     axes.set_ylabel("error of the conductivity [%]")
-    axes.grid(alpha=0.3)
-    right.legend(frameon=False, fontsize=7.5, loc="outside lower center", ncols=2)
+    legend(figure, *axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -173,7 +170,7 @@ def main() -> None:
         writer = csv.DictWriter(file, list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
-    draw(*kept["packing"], rows).savefig(options.output / "figure.png", dpi=130)
+    save(draw(*kept["packing"], rows), options.output / "figure.png")
     for name in kept:
         last = {kind: [r for r in rows if r["voxels"] == kind and r["geometry"] == name][-1] for kind in KINDS}
         found = ", ".join(f"{kind} {100 * row['error']:+.2f} %" for kind, row in last.items())

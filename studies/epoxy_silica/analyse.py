@@ -25,7 +25,9 @@ from etc_engine.engines.voxel import homogenize_voxel, solve_cell, voxelize
 from etc_engine.engines.voxel.section import sample, temperature_between_walls
 from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.phases import find_owners
+from etc_engine.models import CATALOGUE
 from etc_engine.models.catalogue import find_model
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, label_ends, legend, new_panels, save
 
 HERE = Path(__file__).parent
 SEED = 6203
@@ -33,11 +35,11 @@ EPOXY, SILICA = 0.195, 1.5
 FRACTIONS = (0.1, 0.2, 0.3, 0.4, 0.5)
 EDGE, DIAMETERS = 0.1, 6.0
 MODELS = {
-    "hashin_shtrikman_lower": ("HS lower = Maxwell", "#4d4d4d", "-"),
-    "three_point_lower": ("three-point lower", "#009e73", ":"),
-    "third_order": ("third order", "#d55e00", "-"),
-    "three_point_upper": ("three-point upper", "#009e73", "-."),
-    "hashin_shtrikman_upper": ("HS upper", "#4d4d4d", "--"),
+    "hashin_shtrikman_lower": (INK, "-"),
+    "three_point_lower": (GREY, ":"),
+    "third_order": (COLOURS[2], "-"),
+    "three_point_upper": (GREY, "-."),
+    "hashin_shtrikman_upper": (INK, "--"),
 }
 POINTS = {"A": (0.5, 0.6, 0.6), "B": (0.5, 0.02, 0.5), "C": (0.5, 0.3, 0.55), "D": (0.5, 0.82, 0.87)}
 """In edges of the cell, as in the paper's Table 3; the cell is our own, so its numbers are too."""
@@ -170,18 +172,17 @@ def compare_points(resolution: int, particles: int) -> list[dict[str, float | st
 
 
 def draw(data: xr.Dataset) -> Figure:
-    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1))
+    figure, (left, right) = new_panels(1, 2, 4.4)
     f = np.linspace(0.0, 0.55, 111)
     base = model("third_order", f)
-    for name, (label, colour, line) in MODELS.items():
-        left.plot(f, model(name, f), color=colour, linestyle=line, linewidth=1.2, label=label)
+    for name, (colour, line) in MODELS.items():
+        left.plot(f, model(name, f), color=colour, linestyle=line, linewidth=1.2, label=CATALOGUE[name].label)
         right.plot(f, 100.0 * (model(name, f) / base - 1.0), color=colour, linestyle=line, linewidth=1.2)
     x = data["volume_fraction"].values
     third = model("third_order", x)
     for name, colour, marker, shift, label in (
-        ("voxel", "#0072b2", "o", -0.004, "FFT"),
-        ("lattice", "#cc79a7", "^", 0.004, "particle lattice"),
+        ("voxel", COLOURS[0], "o", -0.004, "FFT"),
+        ("lattice", COLOURS[1], "^", 0.004, "particle lattice"),
     ):
         known = data[name].count("realization").values
         mean = data[name].mean("realization").values
@@ -198,16 +199,16 @@ def draw(data: xr.Dataset) -> Figure:
             markersize=5,
         )
     limit = data["voxel_extrapolated"].mean("realization").values
-    right.plot(x + 0.012, 100.0 * (limit / third - 1.0), "o", color="#0072b2", fillstyle="none", markersize=5)
-    left.plot([], [], "o", color="#0072b2", fillstyle="none", label="FFT extrapolated, the lattice's cell (right)")
-    left.set_xlabel("volume fraction of silica")
-    right.set_xlabel("volume fraction of silica")
+    right.plot(x + 0.012, 100.0 * (limit / third - 1.0), "o", color=COLOURS[0], fillstyle="none", markersize=5)
+    left.plot([], [], "o", color=COLOURS[0], fillstyle="none", label="FFT extrapolated, one cell")
+    left.set_xlabel("volume fraction of silica [-]")
+    right.set_xlabel("volume fraction of silica [-]")
     left.set_ylabel("effective conductivity [W/(m K)]")
-    right.set_ylabel("difference to third order [%]")
+    right.set_ylabel("difference from third order [%]")
     right.set_ylim(-6, 12)
-    left.legend(frameon=False, fontsize=8)
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
+    beyond = 100.0 * (model("hashin_shtrikman_upper", f) / base - 1.0)
+    label_ends(right, [("", f, beyond)])
+    legend(figure, *left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
@@ -222,7 +223,7 @@ def main() -> None:
     data = sweep(options.realizations, options.shared, options.resolution, options.particles)
     data = extrapolate(data, options.shared)
     data.to_netcdf(options.output / "epoxy_silica.nc", engine="netcdf4")
-    draw(data).savefig(options.output / "figure.png", dpi=130)
+    save(draw(data), options.output / "figure.png")
     report(data)
     rows = compare_points(options.resolution, 2 * options.particles)
     with (options.output / "points.csv").open("w", newline="") as file:

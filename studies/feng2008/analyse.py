@@ -11,7 +11,6 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from etc_engine import (
     Box,
@@ -27,6 +26,7 @@ from etc_engine.engines.dtem.field import recover_field
 from etc_engine.engines.dtem.methods import METHODS
 from etc_engine.medium.medium import medium_of
 from etc_engine.output.figures import save_field
+from etc_engine.output.figures.canvas import MARKERS, legend, new_panels, save
 
 HERE = Path(__file__).parent
 PUBLISHED = HERE.parents[1] / "tests" / "published" / "data"
@@ -67,15 +67,13 @@ def tables(output: Path) -> None:
 
 def draw_errors(path: Path, truth: np.ndarray, temperatures: dict[str, np.ndarray]) -> None:
     """Error of the 17 contact temperatures, by method."""
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
-    axes = figure.add_subplot()
+    figure, (axes,) = new_panels()
     zones = np.arange(1, truth.size + 1)
-    for marker, (method, values) in zip("os^Dv", temperatures.items(), strict=False):
+    for marker, (method, values) in zip(MARKERS, temperatures.items(), strict=False):
         axes.semilogy(zones, np.abs(values - truth), marker, markersize=4, label=method)
-    axes.set(xlabel="contact", ylabel="|T - converged truth| [K]", xticks=zones)
-    axes.grid(color="0.9")
-    axes.legend(ncols=4, fontsize=8)
-    figure.savefig(path, dpi=120)
+    axes.set(xlabel="contact", ylabel="temperature, difference to the truth [K]", xticks=zones)
+    legend(figure, ncols=5, loc="outside upper center")
+    save(figure, path)
 
 
 def second_example(output: Path) -> str:

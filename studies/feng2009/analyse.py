@@ -12,7 +12,6 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from etc_engine import (
     Box,
@@ -28,6 +27,7 @@ from etc_engine.engines.dtem.conductivity import element_conductivity
 from etc_engine.engines.pipe.steady import pipe_conductivity
 from etc_engine.medium.medium import medium_of
 from etc_engine.medium.network import ContactNetwork
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, TEXT, legend, new_panels, save
 
 HERE = Path(__file__).parent
 TRUTH = 0.2787774  # corner-graded finite elements between two energy bounds, +- 1e-7
@@ -35,7 +35,11 @@ SEED = 20092
 DENSITIES = (0.65, 0.70, 0.75)
 DEGREES = (1.0, 2.5, 5.0, 10.0, 15.0)
 METHODS = ("pipe, uniform", "pipe, chord", "chord")
-COLOURS = {"pipe, uniform": "#b2182b", "pipe, chord": "#ef8a62", "chord": "#2166ac"}
+LABELS = {
+    "pipe, uniform": "pipe network, uniform flux",
+    "pipe, chord": "pipe network, chord",
+    "chord": "thermal elements, chord",
+}
 MODES = 3
 
 
@@ -97,27 +101,26 @@ def write(errors: dict[tuple[float, float, str], np.ndarray], path: Path) -> Non
 
 def draw(errors: dict[tuple[float, float, str], np.ndarray], path: Path) -> None:
     """Signed errors over the half-angle, a panel for each density."""
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    panels = figure.subplots(1, len(DENSITIES), sharey=True)
+    figure, panels = new_panels(1, len(DENSITIES), sharey=True)
     for axes, density in zip(panels, DENSITIES, strict=True):
-        for method in METHODS:
+        for method, colour, marker in zip(METHODS, COLOURS, MARKERS, strict=False):
             rows = [errors[density, degrees, method] for degrees in DEGREES]
             mean = [values.mean() for values in rows]
             axes.fill_between(
                 DEGREES,
                 [values.min() for values in rows],
                 [values.max() for values in rows],
-                color=COLOURS[method],
+                color=colour,
                 alpha=0.2,
                 linewidth=0,
             )
-            axes.plot(DEGREES, mean, "o-", color=COLOURS[method], markersize=3, linewidth=1.0, label=method)
-        axes.axhline(0.0, color="black", linewidth=0.6)
-        axes.set_title(f"density {density:.2f}", fontsize=10)
+            axes.plot(DEGREES, mean, color=colour, marker=marker, markersize=4, linewidth=1.0, label=LABELS[method])
+        axes.axhline(0.0, color=INK, linewidth=0.6)
+        axes.set_title(f"density {density:.2f}", fontsize=TEXT)
         axes.set_xlabel("contact half-angle [degree]")
     panels[0].set_ylabel("error against exact [%]")
-    panels[0].legend(fontsize=8)
-    figure.savefig(path, dpi=110)
+    legend(figure, *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    save(figure, path)
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from etc_engine.medium.medium import medium_of
-from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, new_figure, save, style
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, TEXT, legend, mark_outside, new_panels, save
 from etc_engine.realization import transient_system
 from etc_engine.solvers.marching import march
 
@@ -64,8 +64,8 @@ def errors(case: Case, model: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def draw(path: Path, results: dict[tuple[str, str], tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
     """Mean temperatures, their errors, and the errors of the wall heat flow, a row for each case."""
-    figure = new_figure(11.0, 6.4)
-    grid = figure.subplots(2, 3)
+    figure, panels = new_panels(2, 3, 3.6)
+    grid = panels.reshape(2, 3)
     for row, case in zip(grid, CASES, strict=True):
         fourier, _, means = reference(case)
         shown = (0, 1) if means.shape[1] == 2 else (0, 4, 2)
@@ -75,22 +75,24 @@ def draw(path: Path, results: dict[tuple[str, str], tuple[np.ndarray, np.ndarray
             for name, values in dense.items():
                 look = COLOURS[list(MODELS).index(name)]
                 row[0].plot(fourier, values[:, p], color=look, linewidth=1.0, label=name if k == 0 else "")
-        row[0].set_ylabel(f"mean temperature of disks {', '.join(str(p + 1) for p in shown)} [K]", fontsize=9)
+        row[0].set_ylabel(f"mean temperature of disks {', '.join(str(p + 1) for p in shown)} [K]")
+        for axes, low, high in ((row[1], 1e-6, 0.3), (row[2], 1e-5, 2.0)):
+            axes.set(xscale="log", yscale="log", ylim=(low, high), xlim=(0.5 * fourier[0], 2.0 * fourier[-1]))
         for k, name in enumerate(MODELS):
             _, temperature, flow = results[case.name, name]
             for axes, values in ((row[1], temperature), (row[2], flow)):
-                axes.loglog(fourier, values, color=COLOURS[k], marker=MARKERS[k], markersize=3, linewidth=1, label=name)
-        row[1].set_ylabel("largest error of a mean temperature [K]", fontsize=9)
-        row[2].set_ylabel("relative error of the heat into the wall", fontsize=9)
-        row[1].set_ylim(1e-6, 0.3)
-        row[2].set_ylim(1e-5, 2.0)
-        row[0].set_title(f"{case.name} disks", fontsize=10, loc="left")
+                axes.plot(fourier, values, color=COLOURS[k], marker=MARKERS[k], markersize=3, linewidth=1, label=name)
+                mark_outside(axes, fourier, values, COLOURS[k])
+        row[1].set_ylabel("largest error of a mean temperature [K]")
+        row[2].set_ylabel("relative error of the heat into the wall [-]")
+        row[0].set_title(f"{case.name} disks", fontsize=TEXT)
         for axes in row:
-            style(axes)
             axes.set_xscale("log")
-            axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$", fontsize=9)
-    grid[0, 0].legend(fontsize=7.5, frameon=False)
-    grid[0, 1].legend(fontsize=7.5, frameon=False)
+            axes.set_xlabel("Fourier number  $\\kappa t/(\\rho c R^2)$ [-]")
+    names: dict[str, object] = {}
+    for axes in grid[0, :2]:
+        names |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    legend(figure, list(names.values()), list(names), loc="outside upper center", ncols=4)
     save(figure, path)
 
 

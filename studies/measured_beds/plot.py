@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import sys
+import textwrap
 from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from sets import SETS
+
+from etc_engine.output.figures.canvas import COLOURS, INK, TEXT, legend, new_panels, save
 
 AXES = {"li4sio4_pressure": "pressure", "dimensionless": "contrast", "aquaro": "row"}
 LABELS = {"contrast": "$k_s/k_f$", "pressure": "p [Pa]", "temperature": "T [K]", "row": "row (no temperature given)"}
@@ -20,8 +22,7 @@ def main(table: str, picture: str) -> None:
     with Path(table).open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             rows[row["set"]].append(row)
-    figure = Figure(figsize=(11, 9), layout="constrained")
-    panels = figure.subplots(3, 3).ravel()
+    figure, panels = new_panels(3, 3, 2.9)
     for measured, panel in zip(SETS, panels, strict=False):
         axis, found = AXES.get(measured.key, "temperature"), rows[measured.key]
         x = np.array([i if axis == "row" else float(row[axis] or 300.0) for i, row in enumerate(found)])
@@ -30,26 +31,25 @@ def main(table: str, picture: str) -> None:
         low, best, high = (np.array(values)[order] for values in (low, best, high))
         if len(found) == 1 or axis == "row":
             spread = [best - low, high - best]
-            panel.errorbar(x[order], best, spread, fmt="o", ms=3, color="tab:blue", alpha=0.5)
+            panel.errorbar(x[order], best, spread, fmt="o", ms=3, color=COLOURS[0], alpha=0.5)
         else:
-            panel.fill_between(x[order], low, high, color="tab:blue", alpha=0.2, lw=0)
-            panel.plot(x[order], best, color="tab:blue")
-        panel.plot(x, real, "k.", ms=4)
+            panel.fill_between(x[order], low, high, color=COLOURS[0], alpha=0.2, lw=0)
+            panel.plot(x[order], best, color=COLOURS[0])
+        panel.plot(x, real, ".", color=INK, ms=4)
         if axis in ("contrast", "pressure"):
             panel.set_xscale("log")
         if axis == "contrast":
             panel.set_yscale("log")
-        panel.set_title(measured.title, fontsize=7)
-        panel.set_xlabel(LABELS[axis], fontsize=7)
-        panel.set_ylabel("$k/k_f$" if axis == "contrast" else "k [W/(m K)]", fontsize=7)
-        panel.tick_params(labelsize=7)
-    legend = panels[len(SETS)]
-    legend.set_axis_off()
-    legend.plot([], [], "k.", label="measured")
-    legend.plot([], [], color="tab:blue", label="computed, best estimate")
-    legend.fill_between([], [], color="tab:blue", alpha=0.2, label="ends of the assumed inputs")
-    legend.legend(loc="center", frameon=False, fontsize=8)
-    figure.savefig(picture, dpi=110)
+        panel.set_title(textwrap.fill(measured.title, 30), fontsize=TEXT)
+        panel.set_xlabel(LABELS[axis])
+        panel.set_ylabel("$k/k_f$" if axis == "contrast" else "k [W/(m K)]")
+    key = panels[len(SETS)]
+    key.set_axis_off()
+    key.plot([], [], ".", color=INK, label="measured")
+    key.plot([], [], color=COLOURS[0], label="computed, best estimate")
+    key.fill_between([], [], color=COLOURS[0], alpha=0.2, label="ends of the assumed inputs")
+    legend(key, loc="center")
+    save(figure, picture)
 
 
 if __name__ == "__main__":

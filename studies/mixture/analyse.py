@@ -11,8 +11,9 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 from scipy.optimize import brentq
+
+from etc_engine.output.figures.canvas import GREY, INK, MARKERS, legend, new_panels, save
 
 
 def effective_medium(x: float, k1: float, k2: float, z: float) -> float:
@@ -51,33 +52,33 @@ def main(result: str, picture: str) -> None:
         off = 100.0 * (mean.sel(contact_angle=angle) / medium - 1.0)
         print(f"{angle:g} degrees: {float(off.min()):+.1f} % to {float(off.max()):+.1f} % off the effective medium")
 
-    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(height=4.2)
     fine = np.linspace(0.0, 1.0, 101)
-    for i, angle in enumerate(angles):
+    for angle, marker, fill in zip(angles, MARKERS, ("full", *["none"] * len(MARKERS)), strict=False):
         axes.errorbar(
             x,
             mean.sel(contact_angle=angle),
             error.sel(contact_angle=angle),
-            fmt="os^D"[i % 4],
-            markersize=4,
+            fmt=marker,
+            fillstyle=fill,
+            markersize=5,
             capsize=2,
             label=f"simulation, {angle:g}°",
         )
     axes.plot(
         fine,
         [effective_medium(value, k1, k2, z) for value in fine],
-        "k-",
+        "-",
+        color=INK,
         linewidth=0.9,
         label=f"effective medium of a network, z = {z:.2f}",
     )
-    axes.plot(fine, (k2 / k1) ** fine, "k:", linewidth=0.9, label="geometric mean")
+    axes.plot(fine, (k2 / k1) ** fine, ":", color=GREY, linewidth=1.2, label="geometric mean")
     axes.set_yscale("log")
     axes.set_xlabel("number fraction of the better conductor [-]")
     axes.set_ylabel("conductivity over that of material 1 alone [-]")
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
-    figure.savefig(picture, dpi=130)
+    legend(axes)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ import sys
 import numpy as np
 from bed import sheared_bed
 from matplotlib.collections import EllipseCollection
-from matplotlib.figure import Figure
 
 from etc_engine import effective_conductivity
 from etc_engine.engines.pipe.steady import pipe_conductivity
@@ -20,6 +19,7 @@ from etc_engine.medium.network import ContactNetwork
 from etc_engine.medium.rules import overlap_contacts
 from etc_engine.medium.transient import ParticleSystem
 from etc_engine.medium.walls import FixedTemperature
+from etc_engine.output.figures.canvas import GREY, INK, MARKERS, TEXT, WIDE, legend, new_figure, save, style
 from etc_engine.particle_files.trajectory import Trajectory
 from etc_engine.realization import transient_system
 from etc_engine.transient.moving import MovingState, Stepping, march_trajectory
@@ -84,7 +84,7 @@ def main(picture: str = "figure.png") -> None:
 def draw(
     bed: Trajectory, states: list[MovingState], means: np.ndarray, errors: np.ndarray, still: float, picture: str
 ) -> None:
-    figure = Figure(figsize=(10.0, 5.8), layout="constrained")
+    figure = new_figure(WIDE, 5.6)
     grid = figure.add_gridspec(2, 3, height_ratios=(1.0, 1.6))
     for column, strain in enumerate(SHOWN):
         frame = int(np.searchsorted(bed.times, strain))
@@ -100,27 +100,30 @@ def draw(
             array=temperatures,
             cmap="inferno",
             clim=(0.0, 1.0),
-            edgecolors="black",
+            edgecolors=INK,
             linewidths=0.2,
         )
         axes.add_collection(disks)
         axes.set(xlim=(0, 1), ylim=(0, 0.5), aspect="equal", xticks=[], yticks=[])
-        axes.set_title(f"strain {strain:g}, Pe = {PECLET[-1]:g}", fontsize=9)
-    figure.colorbar(disks, ax=figure.axes, label="temperature", shrink=0.9)
+        axes.set_title(f"strain {strain:g}, Pe = {PECLET[-1]:g}", fontsize=TEXT)
+    bar = figure.colorbar(disks, ax=figure.axes, shrink=0.9)
+    bar.set_label("temperature [-]", fontsize=TEXT)
+    bar.ax.tick_params(labelsize=TEXT)
     axes = figure.add_subplot(grid[1, :2])
-    axes.axhline(still, color="grey", linestyle="--", linewidth=1.0, label="frames held still, pipe network")
+    style(axes)
+    axes.axhline(still, color=GREY, linestyle="--", linewidth=1.0, label="frames held still, pipe network")
     axes.errorbar(PECLET, means, errors, marker="o", markersize=4, capsize=2, label="sheared")
-    axes.set(xscale="log", ylim=(0.3, 0.4), xlabel="Peclet number (shear rate R² / diffusivity) [-]")
-    axes.set_ylabel("conductivity across, over that of the disks [-]")
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=8)
+    axes.set(xscale="log", ylim=(0.3, 0.4), xlabel="Peclet number (shear rate R²/diffusivity) [-]")
+    axes.set_ylabel("conductivity over that of the disks [-]")
+    legend(axes)
     axes = figure.add_subplot(grid[1, 2])
-    for frame in np.searchsorted(bed.times, SHOWN):
+    style(axes)
+    for frame, marker in zip(np.searchsorted(bed.times, SHOWN), MARKERS, strict=False):
         heights, temperatures = bed.packings[frame].centers[:, 1], states[frame].temperatures
-        axes.plot(temperatures, heights, ".", markersize=3, label=f"strain {bed.times[frame]:g}")
-    axes.set(xlabel="temperature", ylabel="height")
-    axes.legend(frameon=False, fontsize=8)
-    figure.savefig(picture, dpi=120)
+        axes.plot(temperatures, heights, marker, markersize=2.5, label=f"strain {bed.times[frame]:g}")
+    axes.set(xlabel="temperature [-]", ylabel="height [-]")
+    legend(axes)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,10 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 from scipy.optimize import curve_fit
 from scipy.stats import t as student
+
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, legend, new_panels, save
 
 UNIVERSAL = 1.30
 
@@ -57,24 +58,23 @@ def main(result: str = "out.nc", picture: str = "figure.png") -> None:
         if top == phi.max():
             threshold, exponent, log_prefactor = values
 
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     fine = np.linspace(threshold + 1e-4, phi.max(), 200)
     curve = np.exp(law(fine, threshold, exponent, log_prefactor))
-    left.errorbar(phi, mean, error, fmt="o", markersize=4, capsize=2)
-    left.plot(fine, curve, "k-", linewidth=0.8)
-    left.axvline(threshold, color="grey", linestyle=":", label=f"threshold {threshold:.4f}")
+    left.errorbar(phi, mean, error, fmt="o", markersize=4, capsize=2, label="simulation")
+    left.plot(fine, curve, "-", color=INK, linewidth=0.8, label="fitted power law")
+    left.axvline(threshold, color=GREY, linestyle=":", label=f"threshold {threshold:.4f}")
     left.set_xlabel("density [-]")
     above = phi > threshold
     right.errorbar(phi[above] - threshold, mean[above], error[above], fmt="o", markersize=4, capsize=2)
-    right.plot(fine - threshold, curve, "k-", linewidth=0.8, label=f"exponent {exponent:.3f}")
+    right.plot(fine - threshold, curve, "-", color=INK, linewidth=0.8, label=f"exponent {exponent:.3f}")
     right.plot(
         fine - threshold,
         curve[-1] * ((fine - threshold) / (fine[-1] - threshold)) ** UNIVERSAL,
         "--",
-        color="tab:orange",
+        color=COLOURS[1],
         linewidth=0.9,
-        label=f"slope {UNIVERSAL:.2f}",
+        label=f"universal exponent {UNIVERSAL:.2f}",
     )
     right.set_xscale("log")
     right.set_yscale("log")
@@ -83,9 +83,8 @@ def main(result: str = "out.nc", picture: str = "figure.png") -> None:
     right.set_xlabel("density above the threshold [-]")
     for axes in (left, right):
         axes.set_ylabel("conductivity [W m$^{-1}$ K$^{-1}$]")
-        axes.grid(alpha=0.3)
-        axes.legend(frameon=False)
-    figure.savefig(picture, dpi=130)
+        legend(axes)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

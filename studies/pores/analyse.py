@@ -12,12 +12,13 @@ import time
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from etc_engine import Box, Medium, ParticlePacking, Pores, effective_conductivity, overlap_contacts
+from etc_engine.models import CATALOGUE
 from etc_engine.models.catalogue import evaluate
+from etc_engine.output.figures.canvas import GREY, INK, TEXT, legend, new_panels, save
 from etc_engine.structure.laguerre_2d import laguerre_cells
 
 DATA = Path(__file__).parents[2] / "tests" / "data" / "pores"
@@ -68,8 +69,8 @@ def timed(medium: Medium, **options: object) -> tuple[float, float]:
 
 
 def main(picture: str = "figure.png") -> None:
-    figure = Figure(figsize=(10.5, 6.4), layout="constrained")
-    axes = figure.subplots(len(CONTRASTS), len(CASES), sharex=True, sharey=True)
+    figure, panels = new_panels(len(CONTRASTS), len(CASES), 3.0, sharex=True, sharey=True)
+    axes = panels.reshape(len(CONTRASTS), len(CASES))
     for column, (case, label) in enumerate(CASES.items()):
         packing, rows = load(case)
         timed(Medium(packing, 10.0, overlap_contacts(packing), Pores(1.0)))  # compile
@@ -101,16 +102,16 @@ def main(picture: str = "figure.png") -> None:
             }
             found["gap network"] = gap_network(packing, contrast)
             for style, (name, k) in zip(("-", "--", ":", "-.", (0, (1, 4))), found.items(), strict=True):
-                text = name.replace("_", " ")
-                panel.axhline(min(abs(error(k)), 1e3), color="0.55", linewidth=0.9, linestyle=style, label=text)
+                text = CATALOGUE[name].label if name in CATALOGUE else name
+                bound = name.startswith("hashin_shtrikman")
+                panel.axhline(abs(error(k)), color=INK if bound else GREY, linewidth=0.9, linestyle=style, label=text)
                 print(f"; {text} {error(k):+.0f}", end="")
             print(" [%]", flush=True)
-            panel.set_title(f"{label}, contrast {contrast:g}", fontsize=9)
-            panel.grid(alpha=0.3)
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=8)
-    figure.supxlabel("processor time [s]")
-    figure.supylabel("error of the conductivity [%]")
-    figure.savefig(picture, dpi=130)
+            panel.set_title(f"{label}\ncontrast {contrast:g}", fontsize=TEXT)
+    legend(figure, *axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    figure.supxlabel("processor time [s]", fontsize=TEXT)
+    figure.supylabel("error of the conductivity [%]", fontsize=TEXT)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

@@ -10,12 +10,10 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 from scipy.stats import t as student
 
 from etc_engine.models.catalogue import find_model
-
-COLOURS = ("#0072b2", "#d55e00", "#009e73")
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, TEXT, legend, mark_outside, new_panels, save
 
 
 def samples(data: xr.Dataset) -> xr.DataArray:
@@ -35,6 +33,8 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
     """One panel and its rows of the table; how many means the three-point bounds hold, and of how many."""
     k = samples(data)
     d = data.sizes["direction_i"]
+    axes.set_xlim(0.0, 0.64 if d == 2 else 0.54)
+    axes.set_ylim((-12, 25) if d == 2 else (-12, 15))
     fine = np.linspace(0.02, 0.62 if d == 2 else 0.52, 60)
     inside = total = 0
     for i, contrast in enumerate(data["particle_conductivity"].values):
@@ -45,14 +45,15 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
         third, low, high = (model(f, contrast, x, d) for f in ("third_order", "three_point_lower", "three_point_upper"))
         base = model("third_order", contrast, fine, d)
         for name, line in (("three_point_lower", ":"), ("three_point_upper", ":"), ("hashin_shtrikman_lower", "--")):
-            axes.plot(
-                fine, 100.0 * (model(name, contrast, fine, d) / base - 1.0), line, color=COLOURS[i], linewidth=1.0
-            )
+            curve = 100.0 * (model(name, contrast, fine, d) / base - 1.0)
+            axes.plot(fine, curve, line, color=COLOURS[i], linewidth=1.0)
+            cut = np.flatnonzero((curve < axes.get_ylim()[0]) | (curve > axes.get_ylim()[1]))[:1]
+            mark_outside(axes, fine[cut], curve[cut], COLOURS[i])
         axes.errorbar(
             x + 0.004 * (i - 1),
             100.0 * (mean / third - 1.0),
             100.0 * half / third,
-            fmt="osD"[i],
+            fmt=MARKERS[i],
             color=COLOURS[i],
             markersize=4,
             capsize=2,
@@ -67,25 +68,23 @@ def draw(axes, data: xr.Dataset, title: str) -> tuple[int, int]:
                 f"({100.0 * (value / t - 1.0):+6.2f} %)  bounds {lo:.5f} {hi:.5f}  "
                 f"grid error estimate {100 * error:.2f} %"
             )
-    axes.axhline(0.0, color="k", linewidth=0.8)
-    axes.plot([], [], ":", color="grey", label="three-point bounds")
-    axes.plot([], [], "--", color="grey", label="Hashin-Shtrikman lower")
-    axes.set_title(title, fontsize=10)
-    axes.set_xlabel("volume fraction" if d == 3 else "area fraction")
-    axes.set_ylabel("difference to the third-order model [%]")
-    axes.set_ylim((-8, 25) if d == 2 else (-8, 12))
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.axhline(0.0, color=INK, linewidth=0.8)
+    axes.plot([], [], ":", color=GREY, label="three-point bounds")
+    axes.plot([], [], "--", color=GREY, label="Hashin-Shtrikman lower")
+    axes.set_title(title, fontsize=TEXT)
+    axes.set_xlabel("volume fraction [-]" if d == 3 else "area fraction [-]")
+    axes.set_ylabel("difference from the third-order model [%]")
     return int(inside), total
 
 
 def main(disks: str = "disks.nc", spheres: str = "spheres.nc", picture: str = "figure.png") -> None:
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    figure, panels = new_panels(1, 2, 4.2)
     counts = []
-    for axes, path, title in zip(figure.subplots(1, 2), (disks, spheres), ("hard disks", "hard spheres"), strict=True):
+    for axes, path, title in zip(panels, (disks, spheres), ("hard disks", "hard spheres"), strict=True):
         with xr.open_dataset(path) as data:
             counts.append(draw(axes, data, title))
-    figure.savefig(picture, dpi=130)
+    legend(figure, *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=5)
+    save(figure, picture)
     for (inside, total), name in zip(counts, ("disks", "spheres"), strict=True):
         print(f"{name}: {inside} of {total} means between the three-point bounds")
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 import xarray
-from matplotlib.figure import Figure
 
+from etc_engine.output.figures.canvas import COLOURS, INK, legend, new_panels, save
 from etc_engine.realization import realize
 from etc_engine.study.sweep import Study
 from etc_engine.sweep.plan import Unit, unit_rng
@@ -86,23 +86,23 @@ def fit(data: xarray.Dataset) -> dict[str, float]:
 
 def draw(data: xarray.Dataset, fitted: dict[str, float], path: Path) -> None:
     """Mean and spread over size."""
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     size = data.particles.values
     fine = np.geomspace(size[0], size[-1])
-    for name, marker, colour in (("periodic", "o", "tab:blue"), ("walls", "s", "tab:orange")):
+    for name, marker, colour in (("periodic", "o", COLOURS[0]), ("walls", "s", COLOURS[1])):
         one = data.sel(boundary=name)
         half = 2.0 * one.conductivity_std / np.sqrt(one.realizations)
         left.errorbar(size, one.conductivity_mean, half, fmt=marker, color=colour, markersize=4, label=name)
         right.loglog(size, one.conductivity_std / fitted["limit"], marker, color=colour, markersize=4, label=name)
         right.loglog(fine, np.sqrt(fitted[f"range_{name}"] / fine), color=colour, linewidth=0.8)
-    left.axhline(fitted["limit"], color="tab:blue", linewidth=0.8)
-    left.plot(fine, fitted["limit"] * (1 - fitted["wall"] * fine**-0.5), color="tab:orange", linewidth=0.8)
+    left.axhline(fitted["limit"], color=COLOURS[0], linewidth=0.8)
+    left.plot(fine, fitted["limit"] * (1 - fitted["wall"] * fine**-0.5), color=COLOURS[1], linewidth=0.8)
     left.set(xscale="log", xlabel="disks", ylabel="effective conductivity [W/(m K)]")
-    right.set(xlabel="disks", ylabel="standard deviation / limit")
-    left.legend()
-    right.legend()
-    figure.savefig(path, dpi=110)
+    right.set(xlabel="disks", ylabel="standard deviation over the limit [-]")
+    right.plot([], [], color=INK, linewidth=0.8, label="fit")
+    legend(left)
+    legend(right)
+    save(figure, path)
 
 
 def main() -> None:

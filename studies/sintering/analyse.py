@@ -10,7 +10,9 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+
+from etc_engine.models import CATALOGUE
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, legend, new_panels, save
 
 
 def main(result: str = "out.nc", picture: str = "figure.png") -> None:
@@ -41,24 +43,25 @@ def main(result: str = "out.nc", picture: str = "figure.png") -> None:
         gain = mean.sel({"method": "chord"}) / mean.sel({"method": "standard"}) - 1.0
         print(f"chord over standard: {100 * float(gain.min()):+.1f} % to {100 * float(gain.max()):+.1f} %")
 
-    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
-    axes = figure.subplots()
-    for i, method in enumerate(methods):
-        cell = mean.sel({"method": method})
-        axes.errorbar(
-            1.0 - solid, cell, error.sel({"method": method}), marker="os"[i % 2], markersize=4, capsize=2, label=method
-        )
-    axes.plot(1.0 - solid, mean_field, "--", color="grey", label="contact mean field")
-    axes.plot(1.0 - solid, bound, "k-", linewidth=0.9, label="Hashin-Shtrikman upper bound")
-    axes.plot(1.0 - solid, solid**2, "k-.", linewidth=0.9, label="Bruggeman, pores in solid")
-    axes.plot(1.0 - solid, 2.0 * solid - 1.0, "k:", linewidth=0.9, label="Bruggeman, symmetric")
+    figure, (axes,) = new_panels(height=4.4)
+    for method, colour, marker in zip(methods, COLOURS, MARKERS, strict=False):
+        values, bars = mean.sel({"method": method}), error.sel({"method": method})
+        look = {"color": colour, "marker": marker, "markersize": 4, "capsize": 2}
+        axes.errorbar(1.0 - solid, values, bars, label=f"simulation, {method}", **look)
+    axes.plot(1.0 - solid, mean_field, "--", color=GREY, label=CATALOGUE["contact_mean_field"].label)
+    models = {
+        "hashin_shtrikman_upper": (bound, "-"),
+        "differential_inverse": (solid**2, "-."),
+        "effective_medium": (2.0 * solid - 1.0, ":"),
+    }
+    for name, (values, line) in models.items():
+        axes.plot(1.0 - solid, values, line, color=INK, linewidth=0.9, label=CATALOGUE[name].label)
     axes.invert_xaxis()
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("porosity (exact area outside the disks) [-]")
     axes.set_ylabel("conductivity over that of the solid [-]")
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=8)
-    figure.savefig(picture, dpi=130)
+    legend(figure, loc="outside upper center", ncols=2)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from etc_engine import (
     parse_radii,
 )
 from etc_engine.errors import GeometryError
+from etc_engine.output.figures.canvas import COLOURS, INK, TEXT, legend, mark_outside, new_panels, save
 
 HERE = Path(__file__).parent
 TRUTH = HERE.parents[1] / "tests" / "published" / "data" / "spheres_vacuum.json"
@@ -38,12 +39,12 @@ CELLS = {
 }
 WIDEST = {"sc": 30, "bcc": 30, "fcc": 26}
 METHODS = {
-    "thermal element, chord": ("dtem", "chord", "#2166ac", "-"),
-    "thermal element, standard": ("dtem", "standard", "#b2182b", "-"),
-    "pipes, chord": ("pipe", "chord", "#2166ac", "--"),
-    "pipes, uniform": ("pipe", "uniform", "#b2182b", "--"),
-    "pipes, 2 kappa c": ("pipe", "holm", "#4d9221", "--"),
-    "pipes, root of the area": ("pipe", "root-area", "#7f7f7f", "--"),
+    "thermal element, chord": ("dtem", "chord", COLOURS[0], "-"),
+    "thermal element, standard": ("dtem", "standard", COLOURS[1], "-"),
+    "pipes, chord": ("pipe", "chord", COLOURS[0], "--"),
+    "pipes, uniform": ("pipe", "uniform", COLOURS[1], "--"),
+    "pipes, 2 kappa c": ("pipe", "holm", COLOURS[2], "--"),
+    "pipes, root of the area": ("pipe", "root-area", COLOURS[3], "--"),
 }
 
 
@@ -101,26 +102,27 @@ def rows() -> list[dict[str, object]]:
 
 def draw(table: list[dict[str, object]], truth: list[dict[str, object]]) -> Figure:
     """Absolute errors over the half-angle, a panel for each kind of packing."""
-    figure = Figure(figsize=(10.0, 7.5), layout="constrained")
-    panels = figure.subplots(2, 2, sharey=True, sharex=True).ravel()
+    figure, panels = new_panels(2, 2, 3.4, sharey=True, sharex=True)
     for axes, panel in zip(panels, [*CELLS, "random"], strict=True):
+        axes.set(yscale="log", ylim=(1e-7, 3.0), xlim=(0.0, 32.0))
         own = [row for row in table if row["panel"] == panel]
         angles = [row["degrees"] for row in own]
         for label, (_, _, colour, style) in METHODS.items():
-            axes.semilogy(angles, [abs(row[label]) for row in own], style, color=colour, label=label, marker=".")
+            errors = [abs(row[label]) for row in own]
+            axes.plot(angles, errors, style, color=colour, label=label, marker=".")
+            mark_outside(axes, angles, errors, colour)
         for case in truth:
             if case["kind"] == "vacuum_lattice" and case["lattice"] == panel:
                 mine = [row["exact"] for row in own if row["degrees"] == case["angle_deg"]]
                 if mine:
-                    axes.plot(case["angle_deg"], abs(mine[0] / case["value"] - 1.0), "k*", markersize=9)
-                    axes.plot(case["angle_deg"], case["error"] / case["value"], "k_", markersize=12)
-        axes.set(title=f"{panel} lattice" if panel in CELLS else "random packing, mean angle", ylim=(1e-7, 3.0))
-        axes.grid(alpha=0.3)
-    panels[0].plot([], [], "k*", label="exact against finite elements")
-    panels[0].plot([], [], "k_", label="uncertainty of the finite elements")
-    figure.supxlabel("contact half-angle [degrees]")
-    figure.supylabel("relative error of the conductivity")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncol=4, fontsize=8)
+                    axes.plot(case["angle_deg"], abs(mine[0] / case["value"] - 1.0), "*", color=INK, markersize=9)
+                    axes.plot(case["angle_deg"], case["error"] / case["value"], "_", color=INK, markersize=12)
+        axes.set_title(f"{panel} lattice" if panel in CELLS else "random packing, mean angle", fontsize=TEXT)
+    panels[0].plot([], [], "*", color=INK, label="exact against finite elements")
+    panels[0].plot([], [], "_", color=INK, label="uncertainty of the finite elements")
+    figure.supxlabel("contact half-angle [degrees]", fontsize=TEXT)
+    figure.supylabel("relative error of the conductivity [-]", fontsize=TEXT)
+    legend(figure, *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
 
@@ -134,7 +136,7 @@ def main() -> None:
         writer = csv.DictWriter(file, list(table[0]))
         writer.writeheader()
         writer.writerows({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()} for row in table)
-    draw(table, json.loads(TRUTH.read_text())).savefig(output / "errors.png", dpi=150)
+    save(draw(table, json.loads(TRUTH.read_text())), output / "errors.png")
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ import sys
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
+
+from etc_engine.output.figures.canvas import COLOURS, INK, MARKERS, legend, new_panels, save
 
 
 def main(result: str = "out.nc", picture: str = "result.png") -> None:
@@ -30,22 +31,27 @@ def main(result: str = "out.nc", picture: str = "result.png") -> None:
     for density in data["density"].values:
         print(f"{density:7.2f}  " + "  ".join(f"{float(v):6.3f}" for v in (mean / field).sel(density=density)))
 
-    figure = Figure(figsize=(9.5, 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for i, density in enumerate(data["density"].values):
-        own = {"marker": "osD^v<>P"[i % 8], "label": f"density {density:g}"}
-        angles = data["contact_angle"]
-        left.errorbar(angles, mean.sel(density=density), sem.sel(density=density), capsize=2, **own)
+    figure, (left, right) = new_panels(1, 2)
+    angles = data["contact_angle"]
+    for density, colour, marker in zip(data["density"].values, COLOURS, MARKERS, strict=False):
+        own = {"color": colour, "marker": marker, "markersize": 4}
+        left.errorbar(
+            angles,
+            mean.sel(density=density),
+            sem.sel(density=density),
+            capsize=2,
+            label=f"density {density:.2f}",
+            **own,
+        )
         right.plot(angles, (mean / radius).sel(density=density), **own)
-        right.plot(angles, (field / radius).sel(density=density), ":", color=f"C{i}")
-    left.set_ylabel("conductivity over that of the spheres")
-    right.set_ylabel("the same over contact radius/radius")
-    right.plot([], [], "k:", label="contact mean field")
+        right.plot(angles, (field / radius).sel(density=density), ":", color=colour)
+    left.set_ylabel("conductivity over that of the spheres [-]")
+    right.set_ylabel("the same over contact radius/radius [-]")
+    right.plot([], [], ":", color=INK, label="contact mean field")
     for axes in (left, right):
         axes.set_xlabel("contact half-angle [degrees]")
-        axes.grid(alpha=0.3)
-    right.legend(fontsize=8)
-    figure.savefig(picture, dpi=150)
+    legend(figure, loc="outside upper center", ncols=3)
+    save(figure, picture)
 
 
 if __name__ == "__main__":

@@ -215,7 +215,7 @@ return [found.legend.map(entry => entry[0]),
     [...found.svg.querySelectorAll('text[text-anchor=end]')].map(t => +t.textContent)]"""
 
 
-def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
+def test_drawn_models_are_in_the_picture_or_have_an_arrow_with_their_value(slow, browser):
     browser.open(slow.url)
     flat = {
         "low": [0.9, 1.9],
@@ -229,6 +229,7 @@ def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
             ("near", [3.0, 4.0]),
             ("far", [90.0, 99.0]),
             ("steep", [1.5, 50.0]),
+            ("falling", [-70.0, 1.5]),
             ("hidden", [0.5, 0.6]),
         )
     ]
@@ -237,8 +238,8 @@ def test_drawn_models_are_in_the_picture_or_said_to_be_outside(slow, browser):
     series = "5°"
     assert browser.run(DRAW, curve, [])[0] == [series]
     assert max(browser.run(DRAW, curve, [])[1]) < 3
-    legend, ticks = browser.run(DRAW, curve, ["near", "far", "steep"])
-    assert legend == [series, "near", "far (outside the picture)", "steep (partly outside the picture)"]
+    legend, ticks = browser.run(DRAW, curve, ["near", "far", "steep", "falling"])
+    assert legend == [series, "near", "far \u2191 99", "steep \u2191 50", "falling \u2193 -70"]
     assert 4 <= max(ticks) < 5
 
 

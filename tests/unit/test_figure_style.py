@@ -15,7 +15,17 @@ from matplotlib.text import Annotation, Text
 from etc_engine.comparison import evaluate_models, model_lines
 from etc_engine.models import CATALOGUE
 from etc_engine.output.figures import draw_comparison, png
-from etc_engine.output.figures.canvas import COLOURS, DOWN_MARK, UP
+from etc_engine.output.figures.canvas import (
+    COLOURS,
+    DOWN,
+    DOWN_MARK,
+    UP,
+    UP_MARK,
+    label_ends,
+    legend,
+    mark_outside,
+    new_panels,
+)
 from etc_engine.sweep.result_file import open_dataset
 
 ROOT = Path(__file__).parents[2]
@@ -95,3 +105,55 @@ def test_the_page_has_the_palette_of_the_figures():
     listed = re.findall(r"#[0-9a-f]{6}", next(line for line in script.splitlines() if line.startswith("const COLOURS")))
     assert len(listed) >= 6
     assert np.array_equal(listed, COLOURS[: len(listed)])
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3])
+def test_letters_of_new_panels_can_be_read_at_600_pixels(columns):
+    figure, panels = new_panels(2, columns)
+    assert len(panels) == 2 * columns
+    for axes in panels:
+        axes.plot([0.0, 1.0], [0.0, 1.0], label="line")
+        axes.set_xlabel("across")
+        assert axes.get_lines()[0].get_color() == COLOURS[0]
+    legend(panels[0])
+    legend(figure, loc="outside upper center")
+    assert smallest_letters(figure) >= 9.0
+
+
+def test_points_outside_a_panel_have_arrows_at_its_edge():
+    _, (axes,) = new_panels()
+    axes.set(xlim=(0.0, 1.0), ylim=(0.0, 2.0))
+    mark_outside(axes, [-0.5, 0.5, 0.9], [3.0, 1.0, -4.0], COLOURS[1])
+    arrows = {line.get_marker(): line.get_xydata().tolist() for line in axes.get_lines()}
+    assert arrows == {UP_MARK: [[0.0, 2.0]], DOWN_MARK: [[0.9, 0.0]]}
+    assert (axes.get_xlim(), axes.get_ylim()) == ((0.0, 1.0), (0.0, 2.0))
+
+
+def test_a_line_that_leaves_a_panel_before_its_end_has_its_farthest_value():
+    _, (axes,) = new_panels()
+    axes.set(xlim=(0.0, 1.0), ylim=(0.0, 2.0))
+    x = [0.0, 0.5, 1.0]
+    label_ends(axes, [("inside", x, [1.0, 1.0, 1.0]), ("dip", x, [-3.0, 0.5, 1.5]), ("end", x, [-9.0, 1.0, 2.5])])
+    labels = [child.get_text() for child in axes.get_children() if isinstance(child, Annotation)]
+    assert labels == ["inside", f"dip {DOWN} -3", f"end {UP} 2.5"]
+
+
+SCRIPTS = sorted(path for path in (ROOT / "studies").glob("*/*.py") if path.parent.name != "site")
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_the_studies_draw_with_the_canvas_of_the_package_alone(path):
+    text = path.read_text(encoding="utf-8")
+    for other in ("pyplot", "savefig", " Figure(", '"tab:', '="C0"', 'f"C{'):
+        assert other not in text, other
+    assert not re.findall(r"""["']#[0-9a-f]{6}["']""", text)
+
+
+def test_a_comparison_of_several_panels_can_be_read_at_600_pixels(made_sweep):
+    text = STUDY.replace("conductivity = 0.1", "conductivity = [0.01, 0.1, 0.2]")
+    comparison = evaluate_models(made_sweep(text, lambda f, *_: 0.3 * f))
+    figure = draw_comparison(comparison, model_lines(comparison))
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert len(shown) == 3
+    assert smallest_letters(figure) >= 9.0
+    assert min(axes.get_window_extent().width for axes in shown) > 0.6 * figure.bbox.width

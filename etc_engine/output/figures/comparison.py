@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,17 +17,16 @@ from numpy.typing import NDArray
 from etc_engine.models import CATALOGUE
 from etc_engine.output.figures.canvas import (
     COLOURS,
-    DOWN,
     DOWN_MARK,
     GREY,
     INK,
     MARKERS,
     SMALL,
     TEXT,
-    UP,
+    label_ends,
+    legend,
     new_figure,
     save,
-    spread,
     style,
 )
 from etc_engine.study.quantities import QUANTITIES, SWEPT, heading_of, word_of
@@ -46,6 +46,9 @@ DECADES = 1.3
 """A logarithmic axis is used when the simulated values span more than this many decades."""
 
 MOST_PANELS = 12
+
+WIDTH = 6.8
+"""Of the figure in inches: `SMALL` letters have 9 pixels where it is shown on 600."""
 
 BOUNDS_NOTE = "Hashin-Shtrikman bounds hold for overlapping particles"
 
@@ -84,9 +87,11 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
     axis = _axis(comparison)
     every = _panels(comparison, axis)
     panels = every[:MOST_PANELS]
-    columns = 2 if len(panels) == 4 else min(len(panels), 3)
+    # One set of models for all panels is labelled once a row; otherwise every panel has labels beside it.
+    own = any(dim in _model_dims(comparison) for dim in axis.panels)
+    columns = 1 if own else min(len(panels), 2)
     rows = -(-len(panels) // columns)
-    figure = new_figure(2.2 + 4.6 * columns, 0.8 + 4.0 * rows)
+    figure = new_figure(WIDTH, 0.8 + (4.0 if rows == 1 else 3.0) * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     logarithmic = _is_wide(comparison["conductivity_mean"].values)
     for axes, (title, part) in zip(grid.flat, panels, strict=False):
@@ -98,7 +103,7 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
         _draw_simulation(axes, part, axis)
         _draw_models(axes, part, lines, axis)
         axes.set_title(title, fontsize=TEXT)
-        axes.set_xlabel(axis.label, fontsize=TEXT)
+        axes.set_xlabel(axis.label if columns == 1 else textwrap.fill(axis.label, 28), fontsize=TEXT)
     if not logarithmic:
         grid[0, 0].set_ylim(*_heights(comparison))
     for i, axes in enumerate(grid.flat):
@@ -108,7 +113,6 @@ def draw_comparison(comparison: xarray.Dataset, lines: xarray.Dataset) -> Figure
             axes.set_xlabel("")
     for axes in grid[:, 0]:
         axes.set_ylabel("effective conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=TEXT)
-    own = any(dim in _model_dims(comparison) for dim in axis.panels)  # otherwise the models are those of the whole row
     for i, (axes, (_, part)) in enumerate(zip(grid.flat, panels, strict=False)):
         if own or i == min(len(panels), (i // columns + 1) * columns) - 1:
             _label_models(axes, part, lines, axis)
@@ -127,7 +131,7 @@ def _heights(comparison: xarray.Dataset) -> tuple[float | None, float | None]:
         return float(min(values.min(initial=0.0), 0.0)), None
     low, high = float(values.min()), float(values.max())
     margin = MARGIN * (high - low if high > low else abs(high) or 1.0)
-    return low - margin, high + margin
+    return (max(low - margin, 0.0) if low >= 0.0 else low - margin), high + margin
 
 
 def _model_dims(comparison: xarray.Dataset) -> tuple[str, ...]:
@@ -241,35 +245,7 @@ def _draw_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: 
 
 
 def _label_models(axes: Axes, part: xarray.Dataset, lines: xarray.Dataset, axis: _Axis) -> None:
-    """Names at the right ends of the model lines, moved apart; an arrow and the value where the end is off the axis."""
-    ends = []
-    bottom, top = axes.get_ylim()
-    for name, x, y in _lines(part, lines, axis):
-        known = np.flatnonzero(np.isfinite(y))
-        if known.size:
-            end = float(y[known[-1]])
-            arrow = "" if bottom <= end <= top else f" {UP if end > top else DOWN} {end:.3g}"
-            ends.append((CATALOGUE[name].label + arrow, float(x[known[-1]]), min(max(end, bottom), top)))
-    if not ends:
-        return
-    axes.set_xlim(axes.get_xlim())  # the labels are placed in these limits
-    axes.set_ylim(axes.get_ylim())
-    to_fraction = axes.transScale + axes.transLimits
-    points = [to_fraction.transform((x, y)) for _, x, y in ends]
-    heights = spread([float(p[1]) for p in points], 0.05, 0.0, 1.0)
-    for (words, _, _), point, height in zip(ends, points, heights, strict=True):
-        axes.annotate(
-            words,
-            xy=(float(point[0]), float(point[1])),
-            xycoords="axes fraction",
-            xytext=(1.03, height),
-            textcoords="axes fraction",
-            fontsize=SMALL,
-            color="#444444",
-            va="center",
-            annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": "#bbbbbb", "linewidth": 0.5, "shrinkA": 1, "shrinkB": 0},
-        )
+    label_ends(axes, [(CATALOGUE[name].label, x, y) for name, x, y in _lines(part, lines, axis)])
 
 
 def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
@@ -280,15 +256,8 @@ def _legend(figure: Figure, part: xarray.Dataset, axis: _Axis) -> None:
     if MEAN_FIELD in part["model"].values:
         handles.append(Line2D([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=0.9, label="contact mean field"))
     title = QUANTITIES[axis.curves].long_name if axis.curves is not None and axis.curves in QUANTITIES else None
-    columns = min(len(handles), 6)
-    figure.legend(
-        handles=handles,
-        title=title,
-        fontsize=SMALL,
-        title_fontsize=SMALL,
-        frameon=False,
-        loc="outside upper center",
-        ncols=columns,
+    legend(
+        figure, handles=handles, title=title, fontsize=SMALL, title_fontsize=SMALL, loc="outside upper center", ncols=4
     )
 
 

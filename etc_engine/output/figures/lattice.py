@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from etc_engine.arrays import Floats
-from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, style
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, legend, new_panels
 
 Series = Mapping[str, tuple[Floats, Floats]]
 """Label -> (abscissae, ordinates)."""
@@ -24,12 +24,10 @@ def _plot(axes: Axes, series: Series, lines: str = "-") -> None:
         )
 
 
-def _finish(axes: Axes, across: str, up: str, legend: bool = True) -> None:
-    style(axes)
-    axes.set_xlabel(across, fontsize=9)
-    axes.set_ylabel(up, fontsize=9)
-    if legend:
-        axes.legend(fontsize=8, frameon=False)
+def _finish(axes: Axes, across: str, up: str) -> None:
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    legend(axes)
 
 
 def draw_calibration(points: Mapping[str, Floats], mean_field: Floats) -> Figure:
@@ -42,8 +40,7 @@ def draw_calibration(points: Mapping[str, Floats], mean_field: Floats) -> Figure
     mean_field : ndarray, shape (m, 2)
         Rows (particles, bound).
     """
-    figure = new_figure(6.2, 4.0)
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(height=4.0)
     for (label, rows), colour, marker in zip(points.items(), COLOURS, MARKERS, strict=False):
         axes.errorbar(
             rows[:, 0], rows[:, 1], rows[:, 2], color=colour, marker=marker, markersize=4, linewidth=1.1, capsize=2,
@@ -67,8 +64,7 @@ def draw_slab(profiles: Mapping[float, tuple[Floats, Floats, Floats]], errors: S
     errors : mapping
         Label -> (times, largest relative error [%]).
     """
-    figure = new_figure(9.4, 3.7)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     for (time, (y, found, exact)), colour in zip(profiles.items(), COLOURS, strict=False):
         order = np.argsort(y)
         left.plot(y[order][::7], found[order][::7], ".", color=colour, markersize=2, alpha=0.5)
@@ -95,8 +91,7 @@ def draw_ball(time: Floats, exact: Floats, centre: Series, errors: Series) -> Fi
     errors : mapping
         Label -> (particles, largest error [K]).
     """
-    figure = new_figure(9.4, 3.7)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     left.plot(time, exact, "-", color=INK, linewidth=1.0, label="exact")
     _plot(left, centre, "none")
     _finish(left, "time [s]", "temperature at the centre [°C]")
@@ -117,8 +112,7 @@ def draw_halo(spread: Series, fluxes: Mapping[str, Floats]) -> Figure:
     fluxes : mapping
         Label -> heat flux of every node over the mean.
     """
-    figure = new_figure(9.4, 3.7)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     _plot(left, spread)
     for level in (5.0, 2.0):
         left.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
@@ -142,8 +136,7 @@ def draw_inclusion(contrasts: Floats, exact: Floats, found: Series, errors: Seri
     errors : mapping
         Label -> (contrasts, error [%], signed).
     """
-    figure = new_figure(9.4, 3.7)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     left.plot(contrasts, exact, "-", color=INK, linewidth=1.0, label="exact (simple cubic)")
     _plot(left, found, "none")
     _plot(right, {label: (x, np.abs(y)) for label, (x, y) in errors.items()})
@@ -166,8 +159,7 @@ def draw_fractions(lines: Series, points: Sequence[tuple[str, Floats]]) -> Figur
     points : sequence
         (label, rows of fraction, conductivity, half-width).
     """
-    figure = new_figure(6.2, 4.2)
-    axes = figure.subplots()
+    figure, (axes,) = new_panels(height=4.2)
     for (label, (x, y)), colour in zip(lines.items(), COLOURS[2:], strict=False):
         axes.plot(x, y, "-", color=colour, linewidth=1.0, label=label)
     for (label, rows), colour, marker in zip(points, COLOURS, MARKERS, strict=False):

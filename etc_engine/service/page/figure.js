@@ -38,22 +38,25 @@ function upright(curve, models, across) {
   const all = curve.series.flatMap(s => [...s.mean, ...s.low, ...s.high]).filter(value => value !== null);
   const low = Math.min(...all), high = Math.max(...all), room = FAR * (Math.max(high - low, 0.2 * Math.abs(high)) || 1);
   for (const model of models) {
-    const values = seen(model, across);
+    const values = seen(model, across).flat();
     if (values.every(value => value > low - room && value < high + room)) all.push(...values);
   }
   return range(all, 0.07, 0.2);
 }
 
-// What a model has between the ends of the horizontal axis.
+// What each curve of a model has between the ends of the horizontal axis.
 function seen(model, across) {
-  return model.curves.flatMap(values => values.filter((value, i) =>
+  return model.curves.map(values => values.filter((value, i) =>
     value !== null && model.at[i] !== null && model.at[i] >= across[0] && model.at[i] <= across[1]));
 }
 
-function absence(model, across, up) {
-  const values = seen(model, across), inside = values.filter(value => value >= up[0] && value <= up[1]);
-  if (inside.length === values.length) return "";
-  return inside.length ? " (partly outside the picture)" : " (outside the picture)";
+// An arrow and the value where a model leaves the picture: at its right end, or else where it is farthest away.
+function outside(model, across, up) {
+  const curves = seen(model, across).filter(values => values.length), beyond = value => Math.max(value - up[1], up[0] - value);
+  const farthest = values => values.reduce((a, b) => beyond(b) > beyond(a) ? b : a, up[0]);
+  const end = farthest(curves.map(values => values[values.length - 1]));
+  const value = beyond(end) > 0 ? end : farthest(curves.flat());
+  return beyond(value) > 0 ? ` ${value > up[1] ? "\u2191" : "\u2193"} ${Number(value.toPrecision(3))}` : "";
 }
 
 function mark(shape, x, y, colour) {
@@ -141,7 +144,7 @@ function figure(curve, shownModels, room) {
       }
     }
     const sample = draw("path", { class: "model", d: "M1 7H33", "stroke-dasharray": dash });
-    legend.push([model.title + absence(model, across, up), draw("svg", { class: "curve", viewBox: "0 0 34 14", "aria-hidden": "true" }, sample)]);
+    legend.push([model.title + outside(model, across, up), draw("svg", { class: "curve", viewBox: "0 0 34 14", "aria-hidden": "true" }, sample)]);
   });
   const looks = looksOf(curve.series);
   curve.series.forEach((series, number) => {

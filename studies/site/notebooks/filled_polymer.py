@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from etc_engine import Box, Medium, PackingSpec, Pores, effective_conductivity, evaluate_model, pack, parse_radii
+from etc_engine.models import CATALOGUE
 from etc_engine.sweep.statistics import interval
 
 EPOXY, SILICA = 0.195, 1.5  # W/(m K)
@@ -57,7 +58,7 @@ half = [mean - [one.low for one in results], [one.high for one in results] - mea
 f = np.linspace(0.0, 0.45, 50)
 plt.errorbar(FRACTIONS, mean, half, fmt="o", capsize=3, label="computed, 3 cells")
 for name, style in (("maxwell", "--"), ("third_order", "-"), ("effective_medium", ":")):
-    plt.plot(f, evaluate_model(name, k1=EPOXY, k2=SILICA, fraction=f, dimension=3), style, label=name)
+    plt.plot(f, evaluate_model(name, k1=EPOXY, k2=SILICA, fraction=f, dimension=3), style, label=CATALOGUE[name].label)
 plt.axhline(0.3, color="0.8", zorder=0)
 plt.xlabel("volume fraction of silica")
 plt.ylabel("conductivity [W/(m K)]")
