@@ -85,10 +85,10 @@ def draw(
     bed: Trajectory, states: list[MovingState], means: np.ndarray, errors: np.ndarray, still: float, picture: str
 ) -> None:
     figure = new_figure(WIDE, 5.6)
-    grid = figure.add_gridspec(2, 3, height_ratios=(1.0, 1.6))
-    for column, strain in enumerate(SHOWN):
+    upper, lower = figure.subfigures(2, 1, height_ratios=(1.0, 2.2))
+    beds = upper.subplots(1, len(SHOWN))
+    for axes, strain in zip(beds, SHOWN, strict=True):
         frame = int(np.searchsorted(bed.times, strain))
-        axes = figure.add_subplot(grid[0, column])
         packing, temperatures = bed.packings[frame], states[frame].temperatures
         disks = EllipseCollection(
             2 * packing.radii,
@@ -106,18 +106,17 @@ def draw(
         axes.add_collection(disks)
         axes.set(xlim=(0, 1), ylim=(0, 0.5), aspect="equal", xticks=[], yticks=[])
         axes.set_title(f"strain {strain:g}, Pe = {PECLET[-1]:g}", fontsize=TEXT)
-    bar = figure.colorbar(disks, ax=figure.axes, shrink=0.9)
+    bar = upper.colorbar(disks, ax=beds, shrink=0.7)
     bar.set_label("temperature [-]", fontsize=TEXT)
     bar.ax.tick_params(labelsize=TEXT)
-    axes = figure.add_subplot(grid[1, :2])
+    left, axes = lower.subplots(1, 2, width_ratios=(2.0, 1.0))
+    style(left)
     style(axes)
-    axes.axhline(still, color=GREY, linestyle="--", linewidth=1.0, label="frames held still, pipe network")
-    axes.errorbar(PECLET, means, errors, marker="o", markersize=4, capsize=2, label="sheared")
-    axes.set(xscale="log", ylim=(0.3, 0.4), xlabel="Peclet number (shear rate R²/diffusivity) [-]")
-    axes.set_ylabel("conductivity over that of the disks [-]")
-    legend(axes)
-    axes = figure.add_subplot(grid[1, 2])
-    style(axes)
+    left.axhline(still, color=GREY, linestyle="--", linewidth=1.0, label="frames held still, pipe network")
+    left.errorbar(PECLET, means, errors, marker="o", markersize=4, capsize=2, label="sheared")
+    left.set(xscale="log", ylim=(0.3, 0.4), xlabel="Peclet number (shear rate R²/diffusivity) [-]")
+    left.set_ylabel("conductivity over that of the disks [-]")
+    legend(left)
     for frame, marker in zip(np.searchsorted(bed.times, SHOWN), MARKERS, strict=False):
         heights, temperatures = bed.packings[frame].centers[:, 1], states[frame].temperatures
         axes.plot(temperatures, heights, marker, markersize=2.5, label=f"strain {bed.times[frame]:g}")
