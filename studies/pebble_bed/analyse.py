@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from etc_engine.comparison import evaluate_models
 from etc_engine.models import CATALOGUE
-from etc_engine.output.figures.canvas import COLOURS, INK, TEXT, new_figure, save, style
+from etc_engine.output.figures.canvas import COLOURS, INK, legend, new_panels, save
 from etc_engine.sweep.result_file import open_dataset
 from etc_engine.sweep.statistics import Summary, summarize
 
@@ -48,9 +48,7 @@ def draw(comparison: xarray.Dataset, beds: Summary) -> Figure:
     temperatures = comparison["temperature"].values
     mean, half = comparison["conductivity_mean"].values, comparison["half_width"].values
     model = comparison["model_conductivity"].sel(model=MODEL).values
-    figure = new_figure(6.0, 4.6)
-    panel = figure.subplots()
-    style(panel)
+    figure, (panel,) = new_panels(height=4.6)
     for i, p in enumerate(comparison["pressure"].values):
         colour, (low, high) = COLOURS[i], (beds.mean[i] - beds.ci_low[i], beds.ci_high[i] - beds.mean[i])
         panel.errorbar(temperatures, mean[i], half[i], color=colour, label=f"helium at {p:g} Pa")
@@ -59,10 +57,10 @@ def draw(comparison: xarray.Dataset, beds: Summary) -> Figure:
     panel.plot([], [], "-", color=INK, label="sweep of packings, load 0.1 MPa")
     panel.plot([], [], "o", color=INK, ms=5, label="poured beds, own weight")
     panel.plot([], [], ":", color=INK, label=CATALOGUE[MODEL].label)
-    panel.set_xlabel("temperature [K]", fontsize=TEXT)
-    panel.set_ylabel("effective conductivity [W/(m K)]", fontsize=TEXT)
+    panel.set_xlabel("temperature [K]")
+    panel.set_ylabel("effective conductivity [W/(m K)]")
     panel.set_ylim(0.0)
-    figure.legend(fontsize=TEXT, loc="outside upper center", ncols=2, frameon=False)
+    legend(figure, loc="outside upper center", ncols=2)
     return figure
 
 

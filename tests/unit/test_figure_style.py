@@ -12,9 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Annotation, Text
 
+from etc_engine.box import Box
 from etc_engine.comparison import evaluate_models, model_lines
+from etc_engine.comparison.convergence import running_statistics, samples
 from etc_engine.models import CATALOGUE
-from etc_engine.output.figures import draw_comparison, png
+from etc_engine.output.figures import draw_comparison, draw_convergence, draw_histograms, draw_structure, png
 from etc_engine.output.figures.canvas import (
     COLOURS,
     DOWN,
@@ -26,6 +28,7 @@ from etc_engine.output.figures.canvas import (
     mark_outside,
     new_panels,
 )
+from etc_engine.packing.particles import ParticlePacking
 from etc_engine.sweep.result_file import open_dataset
 
 ROOT = Path(__file__).parents[2]
@@ -157,3 +160,14 @@ def test_a_comparison_of_several_panels_can_be_read_at_600_pixels(made_sweep):
     assert len(shown) == 3
     assert smallest_letters(figure) >= 9.0
     assert min(axes.get_window_extent().width for axes in shown) > 0.6 * figure.bbox.width
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_letters_of_a_structure_and_of_a_report_can_be_read_at_600_pixels(dimension, made_sweep):
+    edge = 4
+    grid = np.stack(np.meshgrid(*[np.arange(edge)] * dimension), axis=-1).reshape(-1, dimension) + 0.5
+    packing = ParticlePacking(grid, np.linspace(0.45, 0.5, len(grid)), Box((edge,) * dimension, (True,) * dimension))
+    assert smallest_letters(draw_structure(packing, 0.1)) >= 9.0
+    made = made_sweep(STUDY, lambda f, *_: 0.1 * f)
+    for figure in (draw_convergence(running_statistics(made)), draw_histograms(samples(made))):
+        assert smallest_letters(figure) >= 9.0

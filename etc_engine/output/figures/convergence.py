@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, new_figure, style
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, MARKERS, TEXT, legend, new_panels
 from etc_engine.study.quantities import SWEPT, word_of
 
 if TYPE_CHECKING:
@@ -37,8 +38,7 @@ def draw_convergence(running: xarray.Dataset) -> Figure:
     running : xarray.Dataset
         From `etc_engine.comparison.convergence.running_statistics`.
     """
-    figure = new_figure(9.0, 3.6)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     n = running["realization"].values + 1
     last: list[float] = []
     for density, colour in zip(running["density"].values, itertools.cycle(COLOURS), strict=False):
@@ -53,17 +53,15 @@ def draw_convergence(running: xarray.Dataset) -> Figure:
             left.plot(n, mean.values / final, color=colour, linewidth=0.9, alpha=0.8, label=label)
             right.plot(n, np.where(relative > 0.0, relative, np.nan), color=colour, linewidth=0.9, alpha=0.8)
             label = ""
-    style(left)
-    style(right)
     left.axhline(1.0, color=INK, linewidth=0.7)
-    left.set_ylabel("running mean over the final mean [-]", fontsize=9)
+    left.set_ylabel("running mean over the final mean [-]")
     if 0 < running.sizes["density"] <= len(COLOURS):
-        left.legend(fontsize=7.5, frameon=False)
+        legend(left)
     if n.size > 2 and max(last, default=0.0) > 0.0:
         _draw_guide(right, n, max(last))
-    right.set_ylabel("relative half-width of the interval [%]", fontsize=9)
+    right.set_ylabel("relative half-width of the interval [%]")
     for axes in (left, right):
-        axes.set_xlabel("realizations n", fontsize=9)
+        axes.set_xlabel("realizations n")
     return figure
 
 
@@ -73,7 +71,7 @@ def _draw_guide(axes: Axes, n: np.ndarray, level: float) -> None:
     axes.set_yscale("log")
     guide = np.array([float(n[1]), float(n[-1])])
     axes.plot(guide, level * np.sqrt(guide[-1] / guide), "--", color=GREY, linewidth=1.0, label="$n^{-1/2}$")
-    axes.legend(fontsize=8, frameon=False)
+    legend(axes)
     ticks = [tick for tick in (2, 5, 10, 20, 50, 100, 200, 500, 1000, 10000) if n[0] <= tick <= n[-1]]
     axes.set_xticks(ticks, [str(tick) for tick in ticks])
     axes.set_xticks([], minor=True)
@@ -89,27 +87,24 @@ def draw_histograms(values: xarray.DataArray) -> Figure:
     """
     panels = [(name, cell.values[np.isfinite(cell.values)]) for name, cell in cells(values)]
     panels = [(name, data) for name, data in panels if data.size][:MOST_PANELS]
-    columns = min(max(len(panels), 1), 4)
+    columns = min(max(len(panels), 1), 3)
     rows = max(-(-len(panels) // columns), 1)
-    figure = new_figure(2.4 * columns + 0.4, 1.8 * rows + 0.2)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, (name, data) in zip(grid.flat, panels, strict=False):
+    figure, grid = new_panels(rows, columns, 2.2 if rows > 1 else 3.0)
+    for axes, (name, data) in zip(grid, panels, strict=False):
         _draw_histogram(axes, data)
-        axes.set_title(name, fontsize=8)
-    for axes in list(grid.flat)[len(panels) :]:
+        axes.set_title(textwrap.fill(name, 34 if columns > 1 else 80), fontsize=TEXT)
+    for axes in grid[len(panels) :]:
         axes.set_visible(False)
-    figure.supxlabel("conductivity [W m$^{-1}$ K$^{-1}$]; line: mean", fontsize=9)
-    figure.supylabel("realizations", fontsize=9)
+    figure.supxlabel("conductivity [W m$^{-1}$ K$^{-1}$]; line: mean", fontsize=TEXT)
+    figure.supylabel("realizations", fontsize=TEXT)
     return figure
 
 
 def _draw_histogram(axes: Axes, data: np.ndarray) -> None:
-    style(axes)
     spread = float(np.ptp(data))
     bins = "sturges" if spread > 1e-12 * abs(float(data.max())) else 1
     axes.hist(data, bins=bins, color=COLOURS[5], edgecolor="white", linewidth=0.5)
     axes.axvline(float(data.mean()), color=COLOURS[1], linewidth=1.2)
-    axes.tick_params(labelsize=7)
     axes.locator_params(axis="x", nbins=4)
     axes.locator_params(axis="y", nbins=4, integer=True)
 
@@ -122,8 +117,7 @@ def draw_system_sizes(systems: xarray.Dataset) -> Figure:
     systems : xarray.Dataset
         From `etc_engine.comparison.convergence.system_sizes`.
     """
-    figure = new_figure(9.0, 3.6)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = new_panels(1, 2)
     looks = itertools.cycle(zip(COLOURS, MARKERS, strict=True))
     columns = [cells(systems[name]) for name in ("conductivity_mean", "half_width", "relative_spread")]
     particles = systems["particles"].broadcast_like(systems["conductivity_mean"])
@@ -135,17 +129,16 @@ def draw_system_sizes(systems: xarray.Dataset) -> Figure:
         )
         right.plot(count, 100.0 * spread, color=colour, marker=marker, markersize=4, linewidth=1.0)
     for axes in (left, right):
-        style(axes)
         axes.set_xscale("log")
-        axes.set_xlabel("particles", fontsize=9)
+        axes.set_xlabel("particles")
     right.set_yscale("log")
-    left.set_ylabel("conductivity [W m$^{-1}$ K$^{-1}$]", fontsize=9)
-    right.set_ylabel("standard deviation of a realization [%]", fontsize=9)
+    left.set_ylabel("conductivity [W m$^{-1}$ K$^{-1}$]")
+    right.set_ylabel("standard deviation of a realization [%]")
     if systems.sizes["system"] > 1:
         ends = np.array([float(particles.min()), float(particles.max())])
         level = 100.0 * float(np.nanmedian(systems["relative_spread"].isel(system=0)))
         right.plot(ends, level * np.sqrt(ends[0] / ends), "--", color=GREY, linewidth=1.0, label="$N^{-1/2}$")
-        right.legend(fontsize=8, frameon=False)
+        legend(right)
     if len(columns[0]) <= 8:
-        left.legend(fontsize=7, frameon=False)
+        legend(left)
     return figure

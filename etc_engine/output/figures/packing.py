@@ -10,7 +10,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from etc_engine.arrays import Floats
-from etc_engine.output.figures.canvas import INK, new_figure, save
+from etc_engine.output.figures.canvas import INK, TEXT, new_figure, save
 from etc_engine.packing.particles import ParticlePacking
 
 
@@ -63,17 +63,17 @@ def draw_particles(axes: Axes, packing: ParticlePacking) -> None:
     axes.add_collection(discs)
     if high - low > 1e-9 * high:
         bar = axes.figure.colorbar(discs, ax=axes, shrink=0.5, aspect=25, pad=0.02)
-        bar.set_label("height z [m]" if spheres else "radius [m]", fontsize=9)
+        bar.set_label("height z [m]" if spheres else "radius [m]", fontsize=TEXT)
         bar.ax.set_ylim(low, high)
-        bar.ax.tick_params(labelsize=8)
+        bar.ax.tick_params(labelsize=TEXT)
     _draw_box(axes, packing)
     axes.set_aspect("equal")
-    axes.set_xlabel("x [m]", fontsize=9)
-    axes.set_ylabel("y [m]", fontsize=9)
-    axes.tick_params(labelsize=8)
+    axes.set_xlabel("x [m]", fontsize=TEXT)
+    axes.set_ylabel("y [m]", fontsize=TEXT)
+    axes.tick_params(labelsize=TEXT)
     kind = "spheres" if spheres else "disks"
     seen = ", seen along z" if spheres else ""
-    axes.set_title(f"{packing.count} {kind}, density {packing.density:.4f}{seen}", fontsize=10)
+    axes.set_title(f"{packing.count} {kind}, density {packing.density:.4f}{seen}", fontsize=TEXT)
     axes.spines[:].set_visible(False)
 
 

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
 from etc_engine.arrays import Floats
 from etc_engine.box import AXES
 from etc_engine.medium.field import ParticleField
+from etc_engine.output.figures.canvas import TEXT, WIDE, new_figure, save
 from etc_engine.packing.particles import ParticlePacking
 
 PIXELS = 700
@@ -43,23 +43,23 @@ def save_spheres(path: Path, field: ParticleField, caption: str = "") -> None:
     scale = Normalize(low, high if high > low else low + 1.0)
     across, up, normal = slice_axes(field.axis)
     width, height = packing.box.lengths[across], packing.box.lengths[up]
-    figure = Figure(figsize=(11.0, 5.2), layout="constrained")
+    figure = new_figure(WIDE, 4.2)
     left, right = figure.subplots(1, 2)
     place = slice_place(packing, normal)
     image = slice_temperatures(field, PIXELS, place)
     shown = left.imshow(image, extent=(0, width, 0, height), origin="lower", cmap=COLOURS, norm=scale)
     left.set(xlabel=f"{AXES[across]} [m]", ylabel=f"{AXES[up]} [m]", aspect="equal", facecolor="0.9")
     left.locator_params(nbins=6)
-    left.set_title(f"slice at {AXES[normal]} = {place:.3g} m", fontsize=9)
+    left.set_title(f"slice at {AXES[normal]} = {place:.3g} m", fontsize=TEXT)
     view, frame = draw_view(packing, COLOURS(scale(np.ma.masked_invalid(field.particle_temperatures))), PIXELS)
     right.imshow(view, extent=frame, interpolation="bilinear", zorder=2)
     draw_edges(right, packing)
     right.margins(0.04)
     right.set_axis_off()
-    right.set_title("mean temperature of each sphere", fontsize=9, pad=14)
+    right.set_title("mean temperature of each sphere", fontsize=TEXT, pad=14)
     figure.colorbar(shown, ax=[left, right], label="temperature [K]", shrink=0.85)
-    figure.suptitle(caption, fontsize=10)
-    figure.savefig(path, dpi=150, bbox_inches="tight")
+    figure.suptitle(caption, fontsize=TEXT)
+    save(figure, path)
 
 
 def temperature_range(field: ParticleField) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 
 from etc_engine.box import AXES, Box, ball_radius
-from etc_engine.output.figures.canvas import COLOURS, GREY, INK, new_figure, save, style
+from etc_engine.output.figures.canvas import COLOURS, GREY, INK, TEXT, WIDE, legend, new_figure, save, style
 from etc_engine.output.figures.packing import draw_particles
 from etc_engine.packing.neighbors import NeighborPairs, neighbor_pairs
 from etc_engine.packing.particles import ParticlePacking
@@ -35,6 +35,8 @@ GRID_POINTS = 4e6
 """Points of the grid on which the two-point probability is found, with the margins that walls need."""
 WALL_LAYERS = 2.0
 """Mean diameters along each wall that the two-point probability leaves out, where the room allows it."""
+ROW = 2.8
+"""Height in inches of a row of statistics."""
 TANGENT = np.radians(0.01)
 """Contacts of a smaller half-angle are points."""
 
@@ -59,26 +61,27 @@ def save_structure(packing: ParticlePacking, path: Path | str, bond_gap: float =
 
 
 def draw_structure(packing: ParticlePacking, bond_gap: float = 1e-6) -> Figure:
-    """Figure of a packing, with its structure on the right.
+    """Figure of a packing, with its structure below.
 
     Coordination numbers, half-angles of overlapping contacts, contact directions, pair correlation, two-point
     probability, and a table of numbers. Spheres are seen along z, the highest in front; all statistics are
     three-dimensional.
     """
-    figure = new_figure(16.0, 6.6)
-    left, right = np.asarray(figure.subfigures(1, 2, width_ratios=[1.0, 1.55]))
-    draw_particles(left.add_subplot(), packing)
+    seen = min(max(WIDE * packing.box.lengths[1] / packing.box.lengths[0], 2.0), 6.0)
+    figure = new_figure(WIDE, seen + 3 * ROW)
+    above, below = np.asarray(figure.subfigures(2, 1, height_ratios=[seen, 3 * ROW]))
+    draw_particles(above.add_subplot(), packing)
     contacts = neighbor_pairs(packing, relative_gap=bond_gap)
     solid = solid_fraction(packing)
-    _draw_coordination(right.add_subplot(2, 3, 1), packing, contacts)
-    _draw_half_angles(right.add_subplot(2, 3, 2), packing)
+    _draw_coordination(below.add_subplot(3, 2, 1), packing, contacts)
+    _draw_half_angles(below.add_subplot(3, 2, 2), packing)
     if packing.dimension == 2:
-        _draw_rose(right.add_subplot(2, 3, 3, projection="polar"), packing, contacts)
+        _draw_rose(below.add_subplot(3, 2, 3, projection="polar"), packing, contacts)
     else:
-        _draw_cosines(right.add_subplot(2, 3, 3), packing, contacts)
-    _draw_pair_correlation(right.add_subplot(2, 3, 4), packing)
-    _draw_two_point(right.add_subplot(2, 3, 5), packing)
-    _write_numbers(right.add_subplot(2, 3, 6), packing, contacts, solid)
+        _draw_cosines(below.add_subplot(3, 2, 3), packing, contacts)
+    _draw_pair_correlation(below.add_subplot(3, 2, 4), packing)
+    _draw_two_point(below.add_subplot(3, 2, 5), packing)
+    _write_numbers(below.add_subplot(3, 2, 6), packing, contacts, solid)
     return figure
 
 
@@ -116,10 +119,10 @@ def _draw_rose(axes: PolarAxes, packing: ParticlePacking, contacts: NeighborPair
     axes.bar(np.concatenate([middles, middles + np.pi]), heights, width=width, color=COLOURS[0], edgecolor="white")
     turn = np.linspace(0.0, 2.0 * np.pi, 200)
     axes.plot(turn, np.ones_like(turn), color=COLOURS[1], linewidth=1.2, linestyle="--")
-    axes.tick_params(labelsize=7)
+    axes.tick_params(labelsize=TEXT)
     axes.set_yticks([0.5, 1.0], ["", ""])
     axes.grid(True, color="#e6e6e6", linewidth=0.6)
-    axes.set_title("contact directions (dashed: uniform)", fontsize=10)
+    axes.set_title("contact directions (dashed: uniform)", fontsize=TEXT)
 
 
 def _draw_cosines(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs) -> None:
@@ -133,8 +136,8 @@ def _draw_cosines(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs)
         shares, edges = np.histogram(cosines[:, axis], np.linspace(0.0, 1.0, 13), density=True)
         axes.stairs(shares, edges, color=COLOURS[axis], label=f"along {AXES[axis]}", linewidth=1.4)
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")
-    axes.set_ylim(0.0)
-    axes.legend(fontsize=8, frameon=False)
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend
+    legend(axes, loc="upper center", ncols=3)
     _label(axes, "cosine of the angle with an axis", "probability density", title)
 
 
@@ -163,7 +166,7 @@ def _draw_two_point(axes: Axes, packing: ParticlePacking) -> None:
     axes.plot([0.0], [solid], "o", color=COLOURS[1], markersize=5, clip_on=False, label="solid fraction")
     if homogeneous:
         axes.axhline(solid**2, color=GREY, linewidth=1.0, linestyle="--", label="its square")
-    axes.legend(fontsize=8, frameon=False)
+    legend(axes)
     where = f", {WALL_LAYERS:g} diameters off walls" if margin else " of the solid"
     _label(axes, "distance / mean diameter", r"$S_2(r)$", f"two-point probability{where}")
 
@@ -192,8 +195,8 @@ def _write_numbers(axes: Axes, packing: ParticlePacking, contacts: NeighborPairs
     axes.set_axis_off()
     for row, (name, value) in enumerate(rows):
         height = 0.97 - 0.085 * row
-        axes.text(0.0, height, name, transform=axes.transAxes, fontsize=9, color=GREY, va="top")
-        axes.text(0.5, height, value, transform=axes.transAxes, fontsize=9, color=INK, va="top")
+        axes.text(0.0, height, name, transform=axes.transAxes, fontsize=TEXT, color=GREY, va="top")
+        axes.text(0.5, height, value, transform=axes.transAxes, fontsize=TEXT, color=INK, va="top")
 
 
 def _farthest_pairs(packing: ParticlePacking) -> float:
@@ -212,13 +215,13 @@ def _pixels(box: Box) -> int:
 
 def _label(axes: Axes, x: str, y: str, title: str) -> None:
     style(axes)
-    axes.set_xlabel(x, fontsize=9)
-    axes.set_ylabel(y, fontsize=9)
-    axes.set_title(title, fontsize=10)
+    axes.set_xlabel(x, fontsize=TEXT)
+    axes.set_ylabel(y, fontsize=TEXT)
+    axes.set_title(title, fontsize=TEXT)
 
 
 def _say(axes: Axes, title: str, words: str) -> None:
     """A panel that has nothing to draw says why."""
     axes.set_axis_off()
-    axes.set_title(title, fontsize=10)
-    axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", fontsize=10, color=GREY)
+    axes.set_title(title, fontsize=TEXT)
+    axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", fontsize=TEXT, color=GREY)

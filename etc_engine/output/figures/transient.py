@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from etc_engine.box import Box, parse_periodic
-from etc_engine.output.figures.canvas import COLOURS, INK, new_figure, save, style
+from etc_engine.output.figures.canvas import COLOURS, INK, TEXT, WIDE, legend, new_figure, save, style
 from etc_engine.output.figures.spheres import draw_view
 from etc_engine.packing.particles import ParticlePacking
 
@@ -48,9 +48,9 @@ def draw_transient(series: xarray.Dataset) -> Figure:
     """Figure of a transient: a row of packings, and below it the walls' heat flows and the mean temperature."""
     width, height = view_size(series)
     shown = pick_times(series["mean_temperature"].values, PANELS)
-    panel = 11.0 / PANELS
+    panel = WIDE / PANELS
     row = min(max(panel * height / width, LOWEST), 6.0)
-    figure = new_figure(11.0, row + 3.6)
+    figure = new_figure(WIDE, row + 3.6)
     parts: Any = figure.subfigures(2, 1, height_ratios=[row + 0.5, 3.1])
     _draw_packings(parts[0], series, shown)
     flows, means = parts[1].subplots(1, 2)
@@ -63,7 +63,7 @@ def draw_transient(series: xarray.Dataset) -> Figure:
     if np.any(series["source_heat_flow"].values != 0.0):
         flows.plot(time[1:], series["source_heat_flow"].values[1:], color=COLOURS[7], label="sources")
     if flows.lines:
-        flows.legend(frameon=False, fontsize=9)
+        legend(flows)
     flows.axhline(0.0, color=INK, linewidth=0.6)
     flows.set(xlabel="time [s]", ylabel=f"heat flow into the particles [{'W' if 'z' in series else 'W/m'}]")
     temperature = series["temperature"].values
@@ -79,7 +79,7 @@ def draw_transient(series: xarray.Dataset) -> Figure:
     means.plot(time, series["mean_temperature"].values, color=COLOURS[0], label="mean, by heat capacity")
     means.plot(time[shown], series["mean_temperature"].values[shown], "o", color=COLOURS[0], markersize=4)
     # above the axes: on the band its swatch and its words would be lost
-    means.legend(frameon=False, fontsize=9, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
+    legend(means, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
     means.set(xlabel="time [s]", ylabel="temperature [K]")
     for axes in (flows, means):
         style(axes)
@@ -131,7 +131,7 @@ def _draw_packings(figure: Any, series: xarray.Dataset, shown: list[int]) -> Non
     low, high = float(temperature.min()), float(temperature.max())
     panels = figure.subplots(1, len(shown), squeeze=False)[0]
     for axes, k in zip(panels, shown, strict=True):
-        axes.set_title(f"t = {series['time'].values[k]:.4g} s", fontsize=10)
+        axes.set_title(f"t = {series['time'].values[k]:.4g} s", fontsize=TEXT)
         if "z" in series:
             disks = _draw_spheres(axes, series.isel(time=k), low, high if high > low else low + 1.0)
             continue
@@ -153,4 +153,4 @@ def _draw_packings(figure: Any, series: xarray.Dataset, shown: list[int]) -> Non
         axes.add_collection(disks)
         axes.set(xlim=(0, width), ylim=(0, height), aspect="equal", xticks=[], yticks=[])
     bar = figure.colorbar(disks, ax=list(panels), shrink=0.85, aspect=25, pad=0.01)
-    bar.set_label("mean temperature [K]", fontsize=9)
+    bar.set_label("mean temperature [K]", fontsize=TEXT)
