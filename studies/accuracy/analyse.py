@@ -1,7 +1,7 @@
 """Error of every method against ``exact``, the estimate of it for ``chord``, and how the bounds of ``exact`` close.
 
 ``python studies/accuracy/analyse.py [--output DIRECTORY]`` writes map.csv and map.png (errors over the contact
-half-angle), calibration.csv and estimate.png (the estimate for ``chord``), bounds.csv and bounds.png. About a minute.
+half-angle), calibration.csv and estimate.png (the estimate for ``chord``), bounds.csv and bounds.png. 90 seconds.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Against the contact mean field and the law of small angles. A narrow arc alpha adds the resistance
 (1/pi kappa)(ln 1/alpha + c) to each side of a contact, so that 1/k is linear in ln 1/alpha. c follows from the flux
-through the arc: 3/2 if it is uniform (standard), ln 4 if the arc is isothermal (chord, arc); what the contacts of a
-particle do to each other shifts both alike.
+through the arc: 3/2 if it is uniform (standard), ln 4 if the arc is isothermal (chord, arc). The interaction of the
+contacts of a particle shifts both by the same amount.
 """
 
 from __future__ import annotations

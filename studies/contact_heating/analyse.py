@@ -1,7 +1,7 @@
-"""The true temperature inside two disks of a bed that warms up, against what the network models take it for.
+"""True temperatures inside two disks of a bed that warms up, against those of the network models.
 
 ``python studies/contact_heating/analyse.py [--output DIRECTORY]`` writes contact_heating.csv and contact_heating.png.
-The heat that each model sends through the contacts of a disk is given to a meshless solution of the inside of that
+The heat flows of each model through the contacts of a disk are applied to a meshless solution of the interior of that
 disk.
 """
 

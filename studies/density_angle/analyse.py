@@ -1,6 +1,6 @@
-"""How do density, contact angle and pores act together? ``python analyse.py out.nc [collapse.png]``
+"""Joint effect of density, contact angle and pore conductivity: ``python analyse.py out.nc [collapse.png]``
 
-Reads the result of study.toml (or full.toml) with xarray alone; copy it for your own sweeps.
+Reads the result of study.toml (or full.toml) with xarray. Copy the script for your own sweeps.
 """
 
 from __future__ import annotations

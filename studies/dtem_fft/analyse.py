@@ -1,8 +1,8 @@
 """DTEM against FFT on one geometry: ``python studies/dtem_fft/analyse.py [--largest N] [--output DIRECTORY]``
 
-Disks that overlap a little, in a periodic box without a matrix: the body is their union, and method ``exact`` knows its
-conductivity between two bounds. The same union on ever finer grids shows what voxels do to contacts: to necks alone (a
-square array), and to necks and narrow gaps (a random packing). Three minutes.
+The body is the union of slightly overlapping disks in a periodic box without a matrix. Method ``exact`` bounds its
+conductivity from both sides. Finer and finer grids show the error of voxels at necks alone (a square array), and at
+necks and narrow gaps (a random packing). Two minutes.
 """
 
 from __future__ import annotations

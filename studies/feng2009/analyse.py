@@ -1,4 +1,4 @@
-"""How far the pipe network is from the discrete thermal elements and from the truth.
+"""Error of the pipe network against discrete thermal elements and the truth.
 
 ``python studies/feng2009/analyse.py [--realizations 6] [--output DIRECTORY]`` solves the 12-particle assembly of
 Feng et al. 2008 and random assemblies over density and contact half-angle by the pipe network with both of its

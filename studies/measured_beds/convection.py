@@ -1,8 +1,8 @@
-"""Whether the gas of a measured bed can have moved: Darcy-Rayleigh numbers: ``python convection.py``
+"""Natural convection in the measured beds: Darcy-Rayleigh numbers: ``python convection.py``
 
 Ra = g dT K L/(T nu alpha), K = d^2 e^3/(150 (1 - e)^2) (Carman and Kozeny), nu the kinematic viscosity of the gas and
-alpha the conductivity of the bed over rho c of the gas. A layer heated from below starts to move at 4 pi^2 = 39.5. Heat
-that moving gas carries is small against conduction where Ra is about 1 or less.
+alpha the conductivity of the bed over rho c of the gas. Convection in a layer heated from below starts at
+4 pi^2 = 39.5. Heat transport by convection is small against conduction where Ra is about 1 or less.
 """
 
 from __future__ import annotations

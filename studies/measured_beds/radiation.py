@@ -1,9 +1,9 @@
-"""Radiation past the neighbours: rays through a bed against facing surfaces alone: ``python radiation.py beds``.
+"""Radiation beyond the nearest neighbours: rays through a bed against facing surfaces: ``python radiation.py beds``.
 
-Spheres of one temperature each, grey and diffuse, in vacuum. Rays leave every sphere and are reflected until they are
-absorbed. The share of what sphere i emits that j absorbs is the exchange factor F_ij, and 4 sigma T^3 e A_i F_ij is the
-conductance of the pair, neighbour or not. The network of all of them is solved for a mean gradient. Facet links on the
-same bed see facing surfaces alone. Both conductivities are printed over 4 sigma T^3 d.
+Isothermal spheres, grey and diffuse, in vacuum. Rays leave every sphere and are reflected until they are absorbed.
+The exchange factor F_ij is the share of the emission of sphere i that sphere j absorbs, and 4 sigma T^3 e A_i F_ij is
+the conductance of the pair, neighbour or not. The network of all pairs is solved for a mean gradient. Facet links on
+the same bed include facing surfaces only. Both conductivities are printed over 4 sigma T^3 d.
 """
 
 from __future__ import annotations

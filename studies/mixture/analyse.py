@@ -2,7 +2,7 @@
 
 A contact of materials i and j conducts in series, g_ij = 2 k_i k_j/(k_i + k_j) in units of a contact of material 1 with
 itself. Effective medium for networks of coordination number z (S. Kirkpatrick, Rev. Mod. Phys. 45, 574, 1973), with
-the contacts taken for independent: sum_b p_b (g_b - g)/(g_b + (z/2 - 1) g) = 0.
+independent contacts: sum_b p_b (g_b - g)/(g_b + (z/2 - 1) g) = 0.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Heat through a sheared bed: ``python analyse.py [figure.png]``
 
-The bottom wall is held at 1, the top wall at 0. A disk that travels takes its heat along, so the bed conducts better
-the faster it is sheared: the Peclet number is Pe = shear rate R^2 rho c/kappa.
+The bottom wall is held at 1, the top wall at 0. A moving disk keeps its heat, so the bed conducts better the faster it
+is sheared. The Peclet number is Pe = shear rate R^2 rho c/kappa.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A slowly sheared bed of disks, moved by rule rather than by forces: ``python bed.py bed.dump``
+"""A slowly sheared bed of disks with a prescribed motion: ``python bed.py bed.dump``
 
 The box is periodic along x, with walls at the bottom and the top. Every frame
 
@@ -6,7 +6,7 @@ The box is periodic along x, with walls at the bottom and the top. Every frame
 2. pushes pairs apart that overlap by more than ``OVERLAP`` mean radii, each disk by half of the excess, and disks out
    of the walls, ``SWEEPS`` times.
 
-What is left is a dense bed whose disks pass each other, with contacts that open and close.
+The result is a dense bed whose disks pass each other, with contacts that open and close.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Poured beds beside packed ones: ``python analyse.py sweep.nc poured.nc gravity.csv figure.png``
 
-Of the poured beds heat along x and y, which are periodic; along z the cut has walls.
+The conductivity of the poured beds is that along x and y, which are periodic; along z the cut has walls.
 """
 
 from __future__ import annotations

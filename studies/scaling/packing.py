@@ -1,4 +1,4 @@
-"""What one packing on many ranks would take: time and memory of a rank, to 10^9 particles on 1024 ranks.
+"""Predicted time and memory per rank of one packing on many ranks, up to 10^9 particles on 1024 ranks.
 
 ``python studies/scaling/packing.py`` prints the tables of README.md. Costs marked *measured* come from
 ``tests/benchmarks/bench_distributed.py`` on one machine, in processor time of one rank; the others are assumptions
@@ -96,7 +96,8 @@ def main() -> None:
     cases = CASES if asked.particles is None else ((asked.particles, asked.ranks or 1),)
     for name, costs in (("disks", DISKS), ("spheres", SPHERES)):
         print(
-            f"| {name} | ranks | copies | read | contacts | set-up | solve | talk | seconds | GB per rank | GB in all |"
+            f"| {name} | ranks | copies | read | contacts | set-up | solve | communication | total | GB per rank "
+            "| GB in all |"
         )
         print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
         for particles, ranks in cases:

@@ -1,7 +1,7 @@
 """Conductivity of disks that grow into each other: ``python analyse.py out.nc [figure.png]``
 
-Against the upper Hashin-Shtrikman bound of a solid with insulating pores, k f/(2 - f), which binds here: the body is
-the union of the disks and f its exact area.
+Against the upper Hashin-Shtrikman bound of a solid with insulating pores, k f/(2 - f). The bound is rigorous here,
+because the body is the union of the disks and f its exact area.
 """
 
 from __future__ import annotations

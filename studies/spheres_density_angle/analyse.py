@@ -1,6 +1,6 @@
 """Beds of spheres in vacuum over density and contact half-angle: ``python analyse.py out.nc [result.png]``.
 
-Reads the result of study.toml with xarray alone.
+Reads the result of study.toml with xarray.
 """
 
 from __future__ import annotations
