@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import os
 import re
 import subprocess
@@ -54,3 +55,17 @@ def test_a_small_sweep_of_random_composites_keeps_the_three_point_bounds(etc_eng
     printed = analyse("random_composites", out, out, tmp_path / "figure.png")
     assert f"{kind}: 4 of 4 means between the three-point bounds" in printed
     assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+def test_fft_and_lattice_agree_on_a_small_cell_of_epoxy_and_silica(monkeypatch, tmp_path):
+    spec = importlib.util.spec_from_file_location("epoxy_silica_analyse", STUDIES / "epoxy_silica" / "analyse.py")
+    study = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(study)
+    monkeypatch.setattr(study, "FRACTIONS", (0.1,))
+    data = study.extrapolate(study.sweep(1, 1, 52, 4000), 1)
+    assert float(abs(data["lattice"] / data["voxel"] - 1.0).max()) < 0.02
+    study.save(study.draw(data), tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    rows = study.compare_points(32, 6000)
+    assert [row["point"] for row in rows] == list(study.POINTS)
+    assert all(abs(row["temperature_fft"] - row["temperature_lattice"]) < 0.2 for row in rows)
