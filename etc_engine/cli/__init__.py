@@ -33,11 +33,17 @@ COMMANDS = {
     "materials": "etc_engine.cli.materials:materials_command",
     "keys": "etc_engine.cli.keys:keys_command",
     "transient": "etc_engine.cli.transient:transient_command",
+    "warm": "etc_engine.cli.warm:warm_command",
     "serve": "etc_engine.cli.serve:serve_command",
     "submit": "etc_engine.cli.submit:submit_command",
     "status": "etc_engine.cli.status:status_command",
     "fetch": "etc_engine.cli.fetch:fetch_command",
 }
+
+NOWHERE = (
+    "compiled kernels can be kept neither beside the package nor in the home folder: set NUMBA_CACHE_DIR to a folder "
+    "that can be written"
+)
 
 EXIT_DONE = 0
 EXIT_BUG = 1
@@ -128,6 +134,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         if os.environ.get("ETC_ENGINE_TRACEBACK"):
             raise
         what = f"unexpected {type(error).__name__}: {error}"
+        if "no locator available" in what:  # the words of numba
+            what = NOWHERE
         return _refuse(f"{what} (set ETC_ENGINE_TRACEBACK=1 to see where)", EXIT_BUG)
     return status if isinstance(status, int) else EXIT_DONE
 

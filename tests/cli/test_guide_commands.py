@@ -25,6 +25,7 @@ LONG = (
     "homogenize inclusions.csv --box 1,1,1",
     "density_angle/study",
     "pebble_bed/study",
+    "etc-engine warm",
 )
 """Parts of commands that take minutes, or of the main job, which .ci/run runs."""
 ORIGIN = (-0.01, 0.0)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2] / "etc_engine"
-LEAVES = {"arrays", "errors", "box", "ranks", "durable", "solvers", "laws", "models", "materials"}
+LEAVES = {"arrays", "errors", "box", "ranks", "durable", "solvers", "laws", "models", "materials", "kernels"}
 ORDER = (
     ("packing",),
     ("particle_files", "structure"),
