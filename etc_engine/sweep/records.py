@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -49,9 +49,9 @@ def _steady(message: str) -> str:
 
 def encode(record: Record) -> str:
     """A record as one line of JSON, without the newline."""
-    values = asdict(record)
-    values["unit"] = [record.unit.density, record.unit.realization]
-    values["result"]["cells"] = [_plain_cell(cell) for cell in record.result.cells]
+    # the fields as they stand: dataclasses.asdict copies everything, ten times as slowly
+    values = vars(record) | {"unit": [record.unit.density, record.unit.realization]}
+    values["result"] = vars(record.result) | {"cells": [_plain_cell(cell) for cell in record.result.cells]}
     return json.dumps(values, default=_plain_scalar)
 
 
@@ -88,8 +88,7 @@ def _flat(cells: list[Any]) -> list[dict[str, Any]]:
 
 
 def _plain_cell(cell: Outcome) -> dict[str, Any]:
-    values = {field.name: getattr(cell, field.name) for field in fields(Outcome)}
-    values["status"] = int(cell.status)
+    values = vars(cell) | {"status": int(cell.status)}
     if cell.conductivity is not None:
         values["conductivity"] = np.asarray(cell.conductivity, dtype=np.float64).tolist()
     return values
