@@ -207,9 +207,7 @@ def _print_notes(comparison: xarray.Dataset, failed: int) -> None:
         if note and name not in zero:
             click.echo(f"{name}: {note}")
     if failed:
-        click.echo(
-            f"{failed} cells failed and stay out of the means (status 2 to 4, reasons in `message`): a selection"
-        )
+        click.echo(f"{failed} cells failed (status 2 to 4, see `message`): the means leave them out and may be biased")
     bound = "whole cells" if comparison.attrs["pores_conduct"] else "overlapping particles"
     if not comparison.attrs["bounds_bind"]:
         click.echo(f"bounds: only a comparison here: {comparison.attrs['bounds_unbound']}")

@@ -144,7 +144,9 @@ class PhysicsWords:
         from etc_engine.medium.local import LocalProperties, solid_law
 
         if self.material is None and self.gas is None and not self.emissivity:
-            raise InputError("--wall-temperatures need --material, --gas or --emissivity: nothing else follows them")
+            raise InputError(
+                "--wall-temperatures need --material, --gas or --emissivity: nothing else depends on the temperature"
+            )
         every = np.ones(medium.packing.count, dtype=np.bool_)
         named = () if self.material is None else ((every, find_solid(self.material).conductivity),)
         solid = solid_law(medium.conductivity, named)

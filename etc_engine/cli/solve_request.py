@@ -154,7 +154,7 @@ class SolveRequest:
         if self.physics.walls is None:
             return {}
         if method != "facets":
-            raise InputError(f"--wall-temperatures take method facets, found {method}: spheres whose pores conduct")
+            raise InputError(f"--wall-temperatures need method facets (spheres, pores that conduct), found {method}")
         return self.physics.between_walls(medium, axes)
 
 

@@ -131,7 +131,7 @@ class FileStudy(Study):
         """Refuse what ranks that solve each packing together do not take."""
         if set(self.methods) != {"chord"}:
             other = next(method for method in self.methods if method != "chord")
-            raise ValueError(f"conduction.distributed: is for method 'chord', found {other!r}")
+            raise ValueError(f"conduction.distributed: works with method 'chord' only, found {other!r}")
         if not RULES[self.contacts.rule].local:
             able = ", ".join(repr(name) for name, rule in RULES.items() if rule.local)
             raise ValueError(

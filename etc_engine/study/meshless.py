@@ -72,7 +72,7 @@ class Output(StudyTable):
     @model_validator(mode="after")
     def _check(self) -> Output:
         if self.times[0] != 0.0 and abs(self.times[0]) < SMALLEST:
-            raise ValueError(f"times: the first is 0 or at least {SMALLEST:g} s, found {self.times[0]:g}")
+            raise ValueError(f"times: the first must be 0 or at least {SMALLEST:g} s, found {self.times[0]:g}")
         return self
 
 

@@ -37,7 +37,9 @@ def check_models(study: Study) -> None:
             raise ValueError(f"{place} holds in {covered}, found packing.box = {list(study.packing.box)}")
         if name == OF_NETWORKS:
             if not ENGINES[study.conduction.engine].needs_contacts:
-                raise ValueError(f"{place} is of contact networks, engine {study.conduction.engine!r} has none")
+                raise ValueError(
+                    f"{place} needs a network of contacts, which engine {study.conduction.engine!r} lacks: remove it"
+                )
             continue
         _check_inputs(model, known, place)
 

@@ -68,10 +68,12 @@ class Study(StudyFile):
                 )
             self._check_pores(method)
         if dimension not in RULES[self.contacts.rule].dimensions:
-            raise ValueError(f"contacts.rule: {self.contacts.rule!r} is not for boxes of {dimension} lengths")
+            raise ValueError(f"contacts.rule: {self.contacts.rule!r} does not work in {dimension}D (packing.box)")
         refuse_meaningless(self)
         if self.conduction.distributed and not hasattr(self.packing, "sources"):
-            raise ValueError("conduction.distributed: is for packings in files ([packing] files), read in parts")
+            raise ValueError(
+                "conduction.distributed: works only on packings in files (packing.files), which the ranks read in parts"
+            )
         check_conditions(self)
         check_models(self)
         if not engine.needs_contacts:

@@ -398,7 +398,7 @@ class NetworkStudy(StudyFile):
         if self.conduction.dipoles:
             raise ValueError("conduction.dipoles: the rotation of a disk between frames is not known: remove it")
         if motion.expansion != 0.0 and not RULES[self.contacts.rule].geometric:
-            raise ValueError("motion.expansion: radii change the contacts of rule = 'overlap' only")
+            raise ValueError("motion.expansion: works with rule = 'overlap' only, where the radii decide the contacts")
 
 
 def parse_study(content: Mapping[str, Any], source: str = "study") -> NetworkStudy:

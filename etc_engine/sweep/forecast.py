@@ -75,7 +75,9 @@ def forecast(study_path: Path, output: Path | None, ranks: int, realize: Realize
     """
     study, _ = read_study(study_path)
     if study.conduction.distributed:
-        raise StudyError(f"{study_path}: conduction.distributed: --dry-run probes on one rank, which is not to hold it")
+        raise StudyError(
+            f"{study_path}: conduction.distributed: --dry-run solves on one rank, where it may not fit: leave it out"
+        )
     state, done = ("no output is named", set()) if output is None else what_is_there(study, output)
     targets = (study.statistics.realizations,) * len(study.densities)
     units = units_to_run(study.densities, targets, np.empty((0, 2), np.int64))

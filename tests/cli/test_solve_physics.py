@@ -174,7 +174,7 @@ def test_walls_of_two_temperatures(tmp_path, capfd):
     ("extra", "message"),
     [
         (["--wall-temperatures", "900"], "two temperatures"),
-        (["--wall-temperatures", "900:600"], "method facets, found"),
+        (["--wall-temperatures", "900:600"], "need method facets (spheres"),
         (["--wall-temperatures", "900:600", "--plot", "field.png"], "no field at the local temperature is written"),
     ],
 )

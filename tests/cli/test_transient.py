@@ -117,7 +117,7 @@ def test_an_existing_output_is_kept_without_overwrite(tmp_path):
         ("initial = 30.0", "initial = [", "is not valid TOML"),
         ("heat_capacity = 1.0", "heat_capacity = 1e300", "body.heat_capacity: found 1e+300, allowed: a positive"),
         ("heat_capacity = 1.0", "heat_capcity = 1.0", "body.heat_capcity: unknown key, did you mean 'heat_capacity'?"),
-        ("times = [0.6, 1.2]", "times = [1e-320]", "times: the first is 0 or at least 1e-100 s"),
+        ("times = [0.6, 1.2]", "times = [1e-320]", "times: the first must be 0 or at least 1e-100 s"),
         ("times = [0.6, 1.2]", "times = [0.6, '1']", "output.times[1]: found '1', allowed: a list of times"),
         ("steps = 24", "steps = 1_000_000_000_000", "solver.steps: found 1000000000000, allowed"),
         (

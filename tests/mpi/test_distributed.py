@@ -224,10 +224,10 @@ def test_a_sweep_solves_each_packing_by_all_ranks(disks, study, etc_engine):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"conduction": 'method = ["chord", "arc"]'}, "is for method 'chord', found 'arc'"),
+        ({"conduction": 'method = ["chord", "arc"]'}, "works with method 'chord' only, found 'arc'"),
         ({"packing": 'crop = ["0:0.5", ""]'}, "packing.crop: is not taken"),
         ({"contacts": 'rule = "coordination"\ncoordination = 3.0'}, "allowed with conduction.distributed"),
-        ({"packing": 'method = "random-sequential"'}, "is for packings in files"),
+        ({"packing": 'method = "random-sequential"'}, "works only on packings in files"),
     ],
 )
 def test_a_study_for_many_ranks_is_refused_by_key(study, etc_engine, changes, words):

@@ -120,7 +120,7 @@ def test_without_density_the_packer_decides():
             '[contacts]\nrule = "bonded"\ncontact_angle = [10.0, 2.5]\n',
             '[models]\nnames = ["contact_mean_field"]\n[pores]\nconductivity = 0.1\n[conduction]\nengine = "voxel"\n'
             "resolution = 400\n",
-            ("models.names", "'contact_mean_field' is of contact networks, engine 'voxel' has none"),
+            ("models.names", "'contact_mean_field' needs a network of contacts, which engine 'voxel' lacks"),
         ),
         ("schema = 2", "schema = = 2", ("not valid TOML", "line 2")),
     ],

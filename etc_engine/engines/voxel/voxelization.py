@@ -107,7 +107,7 @@ def check_memory(lengths: tuple[float, ...], resolution: int) -> None:
         grid = " x ".join(str(count) for count in shape)
         raise InputError(
             f"resolution {resolution} makes a grid of {grid} voxels, which needs about {needed / 1e9:.3g} GB of memory "
-            f"where this machine has {there / 1e9:.3g}: take a coarser one"
+            f"where this machine has {there / 1e9:.3g}: use a lower resolution"
         )
 
 
