@@ -212,14 +212,40 @@ def reduce_cell(i, cells, edges, grid, degrees, storing, materials, work):  # ty
         for a in range(size):
             solved[c, a] = coupling[c, a]
     solve_cyclic(diagonal, beside, count, size, solved)
-    for c in range(count):
-        for a in range(size):
-            value = coupling[c, a]
-            if value != 0.0:
-                for b in range(a, size):
-                    matrix[a, b] -= value * solved[c, b]
+    _eliminate_bumps(count, size, coupling, solved, matrix)
     eliminate_dense(matrix, inner, size)
     return count, inner, size
+
+
+@njit(cache=True)
+def _eliminate_bumps(count, size, coupling, solved, matrix):  # type: ignore[no-untyped-def]
+    """Subtract G^T (T^-1 G) from the upper triangle, of four nodes at a time that a dense unknown is coupled to."""
+    first, last = np.full(size, count, np.int64), np.full(size, -1, np.int64)
+    for c in range(count):
+        for a in range(size):
+            if coupling[c, a] != 0.0:
+                first[a], last[a] = min(first[a], c), c
+    nodes, shares = np.empty(4, np.int64), np.empty(4)
+    for a in range(size):
+        row, found = matrix[a, a:size], 0
+        for c in range(first[a], last[a] + 1):
+            if coupling[c, a] != 0.0:
+                nodes[found], shares[found] = c, coupling[c, a]
+                found += 1
+            if found == 4 or (c == last[a] and found > 0):
+                for k in range(found, 4):
+                    nodes[k], shares[k] = c, 0.0
+                found = 0
+                r0, r1, r2, r3 = (
+                    solved[nodes[0], a:size],
+                    solved[nodes[1], a:size],
+                    solved[nodes[2], a:size],
+                    solved[nodes[3], a:size],
+                )
+                w0, w1, w2, w3 = shares[0], shares[1], shares[2], shares[3]
+                for b in range(row.size):  # slices from 0: vector instructions
+                    value = row[b] - w0 * r0[b] - w1 * r1[b]
+                    row[b] = value - w2 * r2[b] - w3 * r3[b]
 
 
 @njit(cache=True)
@@ -262,14 +288,27 @@ def _add_disk(count, size, rim, columns, degrees, of_rim, solid, matrix, first, 
     disk_energy(rim[0], count, solid, first, second)
     begin = columns[0, 0]
     product = first  # P = A Phi
-    for i in range(count):
-        for q in range(size - begin):
-            product[i, q] = 0.0
-        for j in range(count):
-            value = second[i, j]
-            side = sides[j]
-            for k in range(degrees[rim[2][side]] + 1):
-                product[i, columns[side, k] - begin] += value * weights[j, k]
+    product[:count, : size - begin] = 0.0
+    start = 0
+    while start < count:  # side by side
+        side, stop = sides[start], start + 1
+        while stop < count and sides[stop] == side:
+            stop += 1
+        for k in range(degrees[rim[2][side]] + 1):
+            column = columns[side, k] - begin
+            for i in range(0, count - 3, 4):  # four sums at once, which need not wait for each other
+                a, b, c, d = product[i, column], product[i + 1, column], product[i + 2, column], product[i + 3, column]
+                for j in range(start, stop):
+                    weight = weights[j, k]
+                    a += second[i, j] * weight
+                    b += second[i + 1, j] * weight
+                    c += second[i + 2, j] * weight
+                    d += second[i + 3, j] * weight
+                product[i, column], product[i + 1, column], product[i + 2, column], product[i + 3, column] = a, b, c, d
+            for i in range(count - count % 4, count):
+                for j in range(start, stop):
+                    product[i, column] += second[i, j] * weights[j, k]
+        start = stop
     for i in range(count):
         row = of_rim[i]
         if row >= 0:
@@ -283,8 +322,9 @@ def _add_disk(count, size, rim, columns, degrees, of_rim, solid, matrix, first, 
             weight = weights[i, k]
             if weight != 0.0:
                 row = columns[sides[i], k]
-                for q in range(row, size):
-                    matrix[row, q] += weight * product[i, q - begin]
+                target, source = matrix[row, row:size], product[i, row - begin : size - begin]
+                for q in range(target.size):
+                    target[q] += weight * source[q]
 
 
 @njit(cache=True)

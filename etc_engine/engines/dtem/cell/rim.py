@@ -36,10 +36,12 @@ def disk_energy(angles, count, conductivity, spare, out):  # type: ignore[no-unt
             squares[j] = x * x
             logs[j] = 0.25 * math.log(x * x) - 0.75
             spare[i, j] = 0.0
-        for k in range(_TERMS - 1, -1, -1):
-            term = CLAUSEN_SERIES[k]
+        for k in range(_TERMS - 1, -1, -6):
+            a, b, c = CLAUSEN_SERIES[k], CLAUSEN_SERIES[k - 1], CLAUSEN_SERIES[k - 2]
+            d, e, f = CLAUSEN_SERIES[k - 3], CLAUSEN_SERIES[k - 4], CLAUSEN_SERIES[k - 5]
             for j in range(i):
-                spare[i, j] = spare[i, j] * squares[j] + term
+                x = squares[j]
+                spare[i, j] = (((((spare[i, j] * x + a) * x + b) * x + c) * x + d) * x + e) * x + f
         for j in range(i):
             spare[i, j] = squares[j] * (logs[j] + spare[i, j] * squares[j])
         spare[i, i] = 0.0
@@ -54,14 +56,17 @@ def disk_energy(angles, count, conductivity, spare, out):  # type: ignore[no-unt
     for i in range(count):  # out = S C
         before, after = (i - 1 if i > 0 else count - 1), (i + 1 if i < count - 1 else 0)
         low, high = factor * inverse[before], factor * inverse[i]
-        for j in range(count):
-            out[i, j] = (low + high) * spare[i, j] - low * spare[before, j] - high * spare[after, j]
+        here, left, right, row = spare[i, :count], spare[before, :count], spare[after, :count], out[i, :count]
+        for j in range(count):  # slices: vector instructions
+            row[j] = (low + high) * here[j] - low * left[j] - high * right[j]
+    end = count - 1
+    below, above = inverse[: count - 2], inverse[1:end]
     for i in range(count):  # out = (S C) S, row by row
-        first, last = out[i, 0], out[i, count - 1]
-        left = last
-        for j in range(count):
-            here = out[i, j]
-            right = out[i, j + 1] if j < count - 1 else first
-            low, high = inverse[j - 1 if j > 0 else count - 1], inverse[j]
-            out[i, j] = (low + high) * here - low * left - high * right
-            left = here
+        row, source = out[i, :count], logs
+        source[:] = row
+        left, here, right, inner = source[: count - 2], source[1:end], source[2:], row[1:end]
+        for j in range(inner.size):
+            inner[j] = (below[j] + above[j]) * here[j] - below[j] * left[j] - above[j] * right[j]
+        row[0] = (inverse[end] + inverse[0]) * source[0] - inverse[end] * source[end] - inverse[0] * source[1]
+        low, high = inverse[end - 1], inverse[end]
+        row[end] = (low + high) * source[end] - low * source[end - 1] - high * source[0]
