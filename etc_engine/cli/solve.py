@@ -105,9 +105,9 @@ def solve_command(
     clock = Clock()
 
     from etc_engine.cli.options import print_json
-    from etc_engine.errors import InputError
     from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings, rarefied_warnings
     from etc_engine.realization import field_along, find_engine
+    from etc_engine.realization.engines import linked_medium
 
     asked = SolveRequest(**given)
     outputs = SolveOutputs(output, vtk, plot)
@@ -123,13 +123,13 @@ def solve_command(
     result = asked.solve(medium, engine, method, axes)
     between = asked.between_walls(medium, method, axes)
     field = None
-    if full or outputs.wanted or medium.pores.conduct:  # in pores that conduct, the field counts the links
-        try:
-            field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
-        except InputError:
-            if full or outputs.wanted:
-                raise
-    record = {**_record(asked, method, result, medium if field is None else field.medium, axes), **between}
+    if full or outputs.wanted:
+        field = field_along(medium, result, engine=engine.name, method=method, axis=axes[0])
+    if field is not None:
+        linked = field.medium
+    else:  # in pores that conduct, heat takes more links than the contacts
+        linked = linked_medium(medium, result, engine=engine.name, method=method, axis=axes[0])
+    record = {**_record(asked, method, result, linked, axes), **between}
     if field is not None and full:
         each = zip(field.medium.links.pairs.tolist(), field.contact_temperatures.tolist(), strict=True)
         record["contact_temperatures"] = [{"particles": pair, "temperature": value} for pair, value in each]

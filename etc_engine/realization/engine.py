@@ -72,6 +72,8 @@ class Engine:
         (medium, walls, method=, source=, options) -> ParticleSystem, of methods with a transient form.
     recover : callable, optional
         (medium, method, solution, load) -> ParticleField of one load of a solution.
+    links : callable
+        (medium, method, solution) -> the medium with every way from particle to particle that heat takes as a link.
     section : callable, optional
         (medium, method=, options) -> section through the heat flux, for a picture.
     remarks : callable
@@ -90,6 +92,7 @@ class Engine:
     options: Mapping[str, Option] = field(default_factory=dict)
     system: Callable[..., ParticleSystem] | None = None
     recover: Callable[[Medium, str, Any, int], ParticleField] | None = None
+    links: Callable[[Medium, str, Any], Medium] = lambda medium, _, __: medium
     section: Callable[..., Any] | None = None
     remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
     distribute: Callable[..., tuple[EffectiveConductivity[Any], Any]] | None = None

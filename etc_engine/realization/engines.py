@@ -118,6 +118,7 @@ ENGINES: Mapping[str, Engine] = {
             distribute=distributed_conductivity,
             system=dtem.system_of,
             recover=dtem.field_of,
+            links=dtem.links_of,
             remarks=dtem.remarks_on,
         ),
         Engine(
@@ -256,3 +257,23 @@ def field_along(
         if axis in solution.axes:
             return row.recover(medium, method, solution, solution.axes.index(axis))
     raise InputError(f"the conductivity along {AXES[axis]} was not asked for: there is no field of that load")
+
+
+def linked_medium(
+    medium: Medium, result: EffectiveConductivity[Any], *, engine: str, method: str, axis: int = 0
+) -> Medium:
+    """The medium with every way from particle to particle that heat takes as a link: that of `field_along`.
+
+    Without temperatures, which cost about as much as the elements in pores that conduct. The medium itself where the
+    engine has no other links.
+
+    Parameters
+    ----------
+    medium, result, engine, method, axis
+        As in `field_along`.
+    """
+    row = find_engine(engine)
+    for solution in result.solutions:
+        if axis in solution.axes:
+            return row.links(medium, method, solution)
+    return medium

@@ -18,6 +18,7 @@ from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.realization import effective_conductivity, field_along, find_engine
+from etc_engine.realization.engines import linked_medium
 from etc_engine.realization.transients import transient_system
 from etc_engine.solvers.marching import march
 
@@ -132,6 +133,9 @@ def test_fields_of_particles_links_and_pores(feng_particles, periodic):
     result = effective_conductivity(medium)
     field = field_along(medium, result, engine="dtem", method="cell")
     links = field.medium.links
+    alone = linked_medium(medium, result, engine="dtem", method="cell").links
+    assert np.array_equal(alone.pairs, links.pairs) and np.array_equal(alone.angles, links.angles)
+    assert np.array_equal(alone.wall_angles, links.wall_angles)
     assert field.particle_temperatures.shape == (12,)
     assert field.contact_flows.shape == (links.count,)
     assert links.count > medium.links.count

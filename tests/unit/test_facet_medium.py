@@ -20,7 +20,7 @@ from etc_engine.errors import InputError
 from etc_engine.medium.conduction import Conduction
 from etc_engine.medium.conductivity import conductivities
 from etc_engine.medium.walls import FixedTemperature
-from etc_engine.realization.engines import field_along, find_engine
+from etc_engine.realization.engines import field_along, find_engine, linked_medium
 from etc_engine.realization.transients import transient_system
 
 
@@ -81,6 +81,9 @@ def test_field_balances_and_lies_between_the_walls():
     result = effective_conductivity(medium, axes=(2,))
     field = field_along(medium, result, engine="dtem", method="facets", axis=2)
     links = medium_links(medium)
+    alone = linked_medium(medium, result, engine="dtem", method="facets", axis=2).links
+    assert np.array_equal(alone.pairs, field.medium.links.pairs)
+    assert np.array_equal(alone.wall_angles, field.medium.links.wall_angles)
     out = np.zeros(medium.packing.count)
     np.add.at(out, links.pairs[:, 0], field.contact_flows)
     np.add.at(out, links.pairs[:, 1], -field.contact_flows)

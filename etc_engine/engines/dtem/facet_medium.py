@@ -254,7 +254,7 @@ def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> Part
     temperature take no heat; theirs is that of the sphere.
     """
     links, sides, axis = solution.links, solution.sides, solution.axes[load]
-    network = links_network(links, medium.network.rule if medium.network else "none")
+    linked = sphere_links(medium, solution)
     m, w = links.count, links.walls.size
     into = into_links(sides, links, solution.heat_flows[:, load])
     mean = solution.sphere_temperatures[:, load].copy()
@@ -269,12 +269,12 @@ def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> Part
     of_links[sides.links[sides.nodes[first]]] = node[first]
     driven = driven_walls(links, solution.axes)
     at_walls = np.where(driven, wall_temperatures(links.walls), of_links[m:])
-    contact = contact_sides(network)
+    contact = contact_sides(linked.links)
     modes = np.zeros((contact.nodes.size, 1))
     modes[contact.of_contacts, 0] = into[:m]
     modes[contact.of_walls, 0] = into[m : m + w, 0]
     return ParticleField(
-        medium=medium.with_network(network),
+        medium=linked,
         axis=axis,
         sides=contact,
         particle_temperatures=mean,
@@ -285,6 +285,11 @@ def sphere_field(medium: Medium, solution: FacetSolution, load: int = 0) -> Part
         face_temperatures=np.column_stack([of_links[:m], of_links[:m]]),
         flow_modes=modes,
     )
+
+
+def sphere_links(medium: Medium, solution: FacetSolution) -> Medium:
+    """The medium with every facet as a link."""
+    return medium.with_network(links_network(solution.links, medium.network.rule if medium.network else "none"))
 
 
 def into_links(sides: FacetSides, links: FacetLinks, flows: Floats) -> Floats:

@@ -33,6 +33,8 @@ class Family:
         (media, conduction) -> one result per medium.
     recover : callable
         (medium, solution, load) -> ParticleField.
+    links : callable
+        (medium, solution) -> the medium with every way from particle to particle that heat takes as a link.
     remarks : callable
         (method, result) -> what a user should know about the accuracy of a result.
     system : callable, optional
@@ -46,6 +48,7 @@ class Family:
     solve: Callable[[Sequence[Medium], Conduction], list[Result]]
     recover: Callable[[Medium, Any, int], ParticleField]
     remarks: Callable[[str, EffectiveConductivity[Any]], tuple[str, ...]] = lambda _, __: ()
+    links: Callable[[Medium, Any], Medium] = lambda medium, _: medium
     system: Callable[..., ParticleSystem] | None = None
     foreign: Mapping[str, Any] = field(default_factory=dict)
     limit: str | None = None
@@ -55,7 +58,7 @@ CONTACTS = Family(
     elements.solve_series,
     lambda _, solution, load: recover_field(solution, load),
     elements.accuracy_remarks,
-    element_system,
+    system=element_system,
 )
 """Elements whose nodes are the contacts; heat takes no other way."""
 
@@ -64,6 +67,7 @@ FAMILIES: Mapping[tuple[str, int], Family] = {
         disk_cells.solve_series,
         disk_cells.disk_field,
         disk_cells.accuracy_remarks,
+        disk_cells.disk_links,
         cell_system,
         {"frame": None},
         "chord",
@@ -72,13 +76,14 @@ FAMILIES: Mapping[tuple[str, int], Family] = {
         sphere_cells.solve_series,
         sphere_cells.sphere_field,
         sphere_cells.accuracy_remarks,
-        sphere_cells.sphere_system,
-        {"degree": 3, "bounds": False},
+        system=sphere_cells.sphere_system,
+        foreign={"degree": 3, "bounds": False},
     ),
     ("facets", 3): Family(
         between_walls.solve_series,
         sphere_facets.sphere_field,
         sphere_facets.accuracy_remarks,
+        sphere_facets.sphere_links,
         sphere_system,
     ),
 }
@@ -133,6 +138,11 @@ def _solve_alike(media: Sequence[Medium], conduction: Conduction) -> list[Result
 def field_of(medium: Medium, method: str, solution: Any, load: int) -> ParticleField:
     """Temperatures and heat flows of one load of a solution."""
     return family_of(method, medium)[0].recover(medium, solution, load)
+
+
+def links_of(medium: Medium, method: str, solution: Any) -> Medium:
+    """The medium with every way from particle to particle that heat takes as a link."""
+    return family_of(method, medium)[0].links(medium, solution)
 
 
 def system_of(medium: Medium, walls: Mapping[str, Any], *, method: str, **options: Any) -> ParticleSystem:

@@ -228,7 +228,7 @@ def disk_field(medium: Medium, solution: CellSolution, load: int = 0) -> Particl
     """
     geometry = solution.model.geometry
     cells, field = geometry.cells, recover_cells(solution, load)
-    links = medium.with_network(edge_network(medium, geometry))
+    links = disk_links(medium, solution)
     sides = contact_sides(links.links)
     between, wall = np.flatnonzero(~cells.at_wall), np.flatnonzero(cells.at_wall)
     flows = np.zeros((sides.nodes.size, 1))
@@ -251,6 +251,11 @@ def disk_field(medium: Medium, solution: CellSolution, load: int = 0) -> Particl
         inside=partial(temperatures_inside, field),
         reach=np.maximum.reduceat(corners, cells.starts[:-1]),
     )
+
+
+def disk_links(medium: Medium, solution: CellSolution) -> Medium:
+    """The medium with every Laguerre edge as a link."""
+    return medium.with_network(edge_network(medium, solution.model.geometry))
 
 
 def edge_network(medium: Medium, geometry: CellGeometry) -> ContactNetwork:
