@@ -1,14 +1,15 @@
 """The compiled kernels of the package: which they are, for which arguments, and how all of them are compiled at once.
 
 numba compiles a kernel when it is first called and keeps the machine code on the disk. `kernels.jsonl` lists every
-kernel with the types of its arguments, the innermost kernels first; `compile_all` compiles them in several processes.
+kernel with the types of its arguments: first those that call no other kernel, then those that call only these, and so
+on. Processes that share the list out from its beginning therefore find on the disk what their kernels call.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor, as_completed
 from importlib import import_module
 from multiprocessing import get_context
@@ -21,15 +22,38 @@ LIST = Path(__file__).with_suffix(".jsonl")
 
 
 class Kernel(NamedTuple):
-    """A kernel, ``module:function``, and its arguments as `describe` writes them."""
+    """A kernel, ``module:function``, and its arguments as `describe` writes them.
+
+    ``uses`` are the packers and methods that call it from Python, such as "advancing-front 2D" or "dtem chord 2D".
+    """
 
     name: str
     arguments: list[Any]
+    uses: list[str]
 
 
 def listed_kernels() -> list[Kernel]:
     """The kernels of the package, each after those that it calls."""
     return [Kernel(*json.loads(line)) for line in LIST.read_text().splitlines()]
+
+
+def needed_kernels(uses: Collection[str]) -> list[Kernel]:
+    """The listed kernels of some packers and methods, each after those that it calls."""
+    kernels = listed_kernels()
+    names: set[str] = set()
+    waiting = {kernel.name for kernel in kernels if not set(uses).isdisjoint(kernel.uses)}
+    while waiting:
+        names |= waiting
+        waiting = {callee for name in waiting for callee in callees(name)} - names
+    return [kernel for kernel in kernels if kernel.name in names]
+
+
+def callees(name: str) -> list[str]:
+    """Names of the kernels that a kernel calls."""
+    function = find(name).py_func
+    called = [function.__globals__.get(word) for word in function.__code__.co_names]
+    kernels = [one.py_func for one in called if hasattr(one, "py_func")]
+    return [f"{one.__module__}:{one.__qualname__}" for one in kernels]
 
 
 def describe(kind: Any) -> Any:
@@ -81,6 +105,13 @@ def compile_kernel(kernel: Kernel) -> bool:
     before = sum(dispatcher.stats.cache_misses.values())
     dispatcher.compile(tuple(numba_type(words) for words in kernel.arguments))
     return bool(sum(dispatcher.stats.cache_misses.values()) > before)
+
+
+def is_compiled(kernel: Kernel) -> bool:
+    """Whether the disk holds a kernel."""
+    dispatcher = find(kernel.name)
+    types = tuple(numba_type(words) for words in kernel.arguments)
+    return dispatcher._cache.load_overload(types, dispatcher.targetctx) is not None
 
 
 def compile_all(jobs: int) -> Iterator[bool]:

@@ -114,8 +114,10 @@ def _connected(action: Callable[[Communicator, Realize], int], realize: Realize 
 def _run(
     study: Path, output: Path, policy: Policy, communicator: Communicator, realize: Realize, part: Part | None
 ) -> int:
+    from etc_engine import realization
     from etc_engine.cli.progress import Progress
-    from etc_engine.sweep.sweep import sweep
+    from etc_engine.sweep.compilation import share_compilation
+    from etc_engine.sweep.sweep import nothing, sweep
 
     started = time.monotonic()
     with Progress() as progress:
@@ -127,6 +129,7 @@ def _run(
             realize,
             report=progress.report,
             notify=progress.notify,
+            prepare=share_compilation if realize is realization.realize else nothing,
             part=part,
         )
     communicator.close()

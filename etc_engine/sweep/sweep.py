@@ -71,8 +71,12 @@ class Outcome:
         return sum(n for status, n in self.cells.items() if Status.NOT_PERCOLATING < status < Status.NOT_RUN)
 
 
-def _silent(*_: object) -> None:
-    """Report to nobody."""
+Prepare = Callable[[Study, Communicator, Callable[[], bool]], None]
+"""Called on every rank before the first unit, with a function that says whether to leave it."""
+
+
+def nothing(*_: object) -> None:
+    """Do nothing: report to nobody, prepare nothing."""
 
 
 def sweep(
@@ -82,8 +86,9 @@ def sweep(
     communicator: Communicator,
     realize: Realize,
     *,
-    report: Report = _silent,
-    notify: Notify = _silent,
+    report: Report = nothing,
+    notify: Notify = nothing,
+    prepare: Prepare = nothing,
     part: Part | None = None,
 ) -> Outcome:
     """Run a study on all ranks of a communicator and write its dataset.
@@ -100,6 +105,9 @@ def sweep(
         (spec, rng) -> Realization, :func:`etc_engine.realization.realize` or a stand-in.
     report, notify : callable
         Progress and remarks, called on rank 0 only.
+    prepare : callable
+        What the ranks do together before the first unit, such as
+        :func:`etc_engine.sweep.compilation.share_compilation`.
     part : Part, optional
         Compute this part of the units only, and leave them for a sweep of the whole study.
 
@@ -122,8 +130,9 @@ def sweep(
         if claim.complete:
             return on_rank_zero(communicator, partial(_outcome_of_file, claim))
         with Watch(claim.folder / "lock", claim.run, launched=communicator.size > 1):
-            table, computed, stopped = _run_rounds(claim, communicator, realize, stop, report, notify)
-        communicator.wait_for_all(_silent)  # nobody watches the lock any more, rank 0 may give it back
+            begin = partial(prepare, claim.study, communicator, lambda: bool(stop.reason))
+            table, computed, stopped = _run_rounds(claim, communicator, realize, stop, report, notify, begin)
+        communicator.wait_for_all(nothing)  # nobody watches the lock any more, rank 0 may give it back
         if stopped:
             return Outcome(output, 0, computed, stopped=stopped)
         if part is not None:
@@ -132,7 +141,13 @@ def sweep(
 
 
 def _run_rounds(
-    claim: Claim, communicator: Communicator, realize: Realize, stop: StopRequest, report: Report, notify: Notify
+    claim: Claim,
+    communicator: Communicator,
+    realize: Realize,
+    stop: StopRequest,
+    report: Report,
+    notify: Notify,
+    begin: Callable[[], None],
 ) -> tuple[Table, int, str]:
     """Compute round after round until every cell is settled.
 
@@ -149,6 +164,9 @@ def _run_rounds(
             break
         base = computed + number * communicator.size
         round_ = _Round(claim, plan, base, f"{claim.run}-{number}", report)
+        if number == 0:
+            round_.tell(communicator)
+            begin()
         stopped = _run_round(round_, communicator, realize, stop)
         if stopped:
             return table, communicator.add(DONE, 0), stopped

@@ -65,7 +65,7 @@ def test_kernels_are_compiled_once(tmp_path):
 def test_a_process_that_is_killed_is_one_line(tmp_path, monkeypatch):
     few = tmp_path / "few.jsonl"
     (tmp_path / "deadly.py").write_text("import os\nos._exit(1)\n")
-    few.write_text('["deadly:kernel", []]\n')
+    few.write_text('["deadly:kernel", [], []]\n')
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     done = warm(tmp_path, few)
     assert done.returncode == 2
@@ -86,4 +86,4 @@ def test_after_warm_no_command_compiles(tmp_path):
     assert f"{len(LISTED)} compiled now" in done.stdout, done.stderr
     record.prepare(tmp_path)
     for words in record.JOBS:
-        assert record.run(words, tmp_path, tmp_path / "cache") == [], words
+        assert record.run(words, tmp_path, tmp_path / "cache").compiled == [], words
