@@ -63,7 +63,8 @@ def disk_energy(angles, count, conductivity, spare, out):  # type: ignore[no-unt
     below, above = inverse[: count - 2], inverse[1:end]
     for i in range(count):  # out = (S C) S, row by row
         row, source = out[i, :count], logs
-        source[:] = row
+        for j in range(count):  # an assignment of slices compiles for a second
+            source[j] = row[j]
         left, here, right, inner = source[: count - 2], source[1:end], source[2:], row[1:end]
         for j in range(inner.size):
             inner[j] = (below[j] + above[j]) * here[j] - below[j] * left[j] - above[j] * right[j]
