@@ -138,7 +138,7 @@ def image_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def write_image_result(path: Path, record: dict[str, Any]) -> None:
-    """The tensor and what it is of, as netCDF.
+    """The tensor, the image and the conductivities, as netCDF.
 
     Raises
     ------

@@ -186,7 +186,7 @@ def _sizes(dataset: xarray.Dataset) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that the engine writes: how it is recognised, and what is said of it."""
+    """A kind of file that the engine writes: how it is recognised, and how it is described."""
 
     name: str
     recognises: Callable[[xarray.Dataset], bool]

@@ -1,4 +1,4 @@
-"""The options with which every command reads particles, and what it reports of the sample that they make."""
+"""The options with which every command reads particles, and its notes on the sample."""
 
 from __future__ import annotations
 

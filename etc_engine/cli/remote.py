@@ -60,7 +60,7 @@ def progress_of(study: dict[str, Any]) -> str:
 
 
 def shown(text: str, length: int = 0) -> str:
-    """Words of others, fit for a terminal: what it would obey is escaped, what is too long is cut.
+    """Text of other people, fit for a terminal: control characters are escaped, long texts are cut.
 
     Examples
     --------

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def trim_cropped_walls(medium: Medium, table: ParticleTable, axes: tuple[int, ...]) -> Medium:
-    """The medium as the driven walls of a crop leave it; the user is told what they go through."""
+    """The medium cut by the driven walls of a crop, with a note on the particles that they cut."""
     import numpy as np
 
     from etc_engine.medium.cut_contacts import trim_crop

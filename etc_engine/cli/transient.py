@@ -156,7 +156,7 @@ def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
 
 
 def _finish(study: NetworkStudy, wanted: Wanted) -> int:
-    """A complete output: see that it is of this study, and draw what is asked for."""
+    """A complete output: check that it belongs to this study, and draw the pictures asked for."""
     import json
 
     from etc_engine.sweep.claim import refuse_other_study

@@ -79,7 +79,7 @@ def system_sizes(datasets: Sequence[xarray.Dataset]) -> xarray.Dataset:
     Raises
     ------
     InputError
-        If a sweep differs in what it varies, or in anything but the box, the number of particles, the seed
+        If sweeps vary different quantities, or differ in anything but the box, the number of particles, the seed
         and the statistics.
     """
     import xarray

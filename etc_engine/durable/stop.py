@@ -48,8 +48,8 @@ class StopRequest:
     def run(self, unit: Callable[[], T]) -> T:
         """Run a unit; `Stopped` leaves it when a signal comes or has come.
 
-        Compiled code turns `Stopped` into an error of its own, which a unit may record: what a unit answers after a
-        signal is no result.
+        Compiled code turns `Stopped` into an error of its own, which a unit may record. The result of a unit
+        after a signal therefore does not count.
         """
         try:
             self._in_unit = True

@@ -19,7 +19,7 @@ class Property:
     Parameters
     ----------
     name : str
-        What it is, for error messages: ``"conductivity of alumina"``.
+        Name for error messages, such as ``"conductivity of alumina"``.
     unit : str
         SI unit, ``"-"`` for a pure number.
     low, high : float

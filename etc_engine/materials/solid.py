@@ -1,4 +1,4 @@
-"""What is known of a solid, and a solid of the user's own table."""
+"""The record of a solid, from the catalogue or from a table of the user."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Solid:
     name : str
         The key under which it is looked up.
     title : str
-        What it is called in print.
+        Name in print.
     conductivity : Property
         Thermal conductivity [W/(m K)].
     youngs_modulus : Property, optional

@@ -18,7 +18,7 @@ class Lattice:
     Parameters
     ----------
     name : str
-        What it is called in messages.
+        Name in messages.
     dimension : int
         2 or 3.
     cell : float

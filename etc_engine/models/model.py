@@ -1,4 +1,4 @@
-"""What is known of a model: its formula, inputs, validity and source."""
+"""The record of a model: formula, inputs, validity and source."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Input:
     name : str
         The argument of the formula.
     meaning : str
-        What it is.
+        The quantity in words.
     unit : str
         SI unit, ``"-"`` for a pure number.
     interval : Interval
@@ -87,7 +87,7 @@ class Model:
     name : str
         The key in the catalogue.
     title : str
-        What it is called in print.
+        Name in print.
     label : str
         Its name in a picture: the title in at most 25 letters.
     function : callable
@@ -101,7 +101,7 @@ class Model:
     validity : str
         Where it can be trusted.
     limits : str
-        What it becomes in the limits one should know.
+        The limits that the formula takes, at a contrast of 1 for example.
     reference : str
         Source, with DOI where there is one.
     """

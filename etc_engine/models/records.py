@@ -11,7 +11,7 @@ from etc_engine.models.model import Model
 
 
 def record(model: Model) -> dict[str, Any]:
-    """What is known of a model, as plain values.
+    """The record of a model as plain values.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def evaluation(
     parameters: Mapping[str, float],
     spelling: str = "{}",
 ) -> dict[str, Any]:
-    """The conductivity by a model, with what it was computed from.
+    """The conductivity by a model, with the inputs of the formula.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""What is written for users: netCDF and VTK of a single solve."""
+"""Files for users: netCDF and VTK of a single solve, exports, figures, reports."""

@@ -78,7 +78,7 @@ def pack(spec: PackingSpec, rng: np.random.Generator, progress: Progress | None 
     Parameters
     ----------
     spec : PackingSpec
-        What it is to be like.
+        Method, radii, box, and number of particles or density.
     rng : numpy.random.Generator
         The only source of randomness: the same generator state gives the same packing, bit for bit.
     progress : callable, optional

@@ -36,7 +36,7 @@ Contacts = Callable[[ParticlePacking], ContactNetwork]
 
 @dataclass(frozen=True, eq=False)
 class ScatteredFile:
-    """A packing in a file, of which each rank holds what it has read.
+    """A packing in a file, of which each rank holds a part.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Options of engines: what a choice means, its default, and what is allowed."""
+"""Options of engines: meaning, default and allowed values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from etc_engine.errors import InputError
 
 Check = Callable[[Any], str]
-"""A value -> what is allowed instead, empty if it is."""
+"""Maps a value to the words for the allowed ones; to an empty text if the value is allowed."""
 
 
 @dataclass(frozen=True)

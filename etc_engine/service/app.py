@@ -382,7 +382,7 @@ async def _require_result(request: Request, study: str) -> None:
 
 
 async def _finished(request: Request, study: str) -> Finished:
-    """What is in a result file; a study that was done and whose file is damaged becomes failed."""
+    """Content of a result file; a study that was done and whose file is damaged becomes failed."""
     service = _service(request)
     try:
         return await asyncio.shield(asyncio.wrap_future(service.live.finished(study)))
@@ -394,7 +394,7 @@ async def _finished(request: Request, study: str) -> Finished:
 
 
 def _submit(service: Service, text: str) -> tuple[Entry, bool]:
-    """Check a study, keep its text, put it in the queue: so the queue never names what is not there.
+    """Check a study, keep its text, put it in the queue: so that the queue never names a study without a text.
 
     One that was cancelled or has failed continues.
     """

@@ -49,7 +49,7 @@ class Guard:
     Parameters
     ----------
     app : App
-        What is guarded.
+        The application behind it.
     settings : Settings
     """
 

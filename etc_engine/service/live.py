@@ -98,7 +98,7 @@ class LiveResults:
         return total
 
     def finished(self, study: str) -> Future[Finished]:
-        """What is in the result file of a finished study, to come; each state of the file is read once.
+        """Content of the result file of a finished study, as a future; each state of the file is read once.
 
         The future raises `OutputError` if the file is damaged or gone, and `EngineError` if it could not be read for
         another reason.

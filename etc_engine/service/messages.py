@@ -43,7 +43,7 @@ class StudySummary(BaseModel):
 class StudyStatus(StudySummary):
     """A study with the end of its log."""
 
-    log: str = Field(description="what its batches printed last")
+    log: str = Field(description="the last lines that its batches printed")
 
 
 class StudyList(BaseModel):

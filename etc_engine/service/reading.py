@@ -24,7 +24,7 @@ SECONDS = 120.0
 
 @dataclass(frozen=True)
 class Finished:
-    """What is known of a finished result.
+    """Summary of a finished result.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Finished:
 
 
 def read_finished(result: Path, memory_bytes: int) -> Finished:
-    """What is in a result file, read by a process of its own within a time limit.
+    """Content of a result file, read by a process of its own within a time limit.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def encoded(curve: dict[str, object], *, complete: bool) -> bytes:
 
 
 def main(result: Path) -> int:
-    """Print what is in a result file; returns the exit status."""
+    """Print the content of a result file; returns the exit status."""
     try:
         dataset = open_dataset(result)
     except OutputError as error:

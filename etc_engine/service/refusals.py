@@ -1,4 +1,4 @@
-"""Bodies and refusals of the HTTP interface: what is taken, and every error as one line of JSON."""
+"""Bodies and refusals of the HTTP interface: accepted bodies, and every error as one line of JSON."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ ENGINE = (sys.executable, "-m", "etc_engine")
 
 @dataclass(frozen=True)
 class Limits:
-    """What is refused before anything runs, and what ends a run.
+    """Limits of requests, studies and runs.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ RETRY_SECONDS = 1.0
 
 @dataclass
 class _Watch:
-    """What is known of a running batch beside the queue."""
+    """The state of a running batch that the queue does not hold."""
 
     began: float = field(default_factory=time.monotonic)
     looked: float = 0.0

@@ -106,7 +106,7 @@ class Losses:
 
 
 def find_losses(packing: ParticlePacking) -> Losses:
-    """What walls cut off the particles, and what they share: density = solid fraction + cut + overlap.
+    """Volume fractions beyond the walls and counted twice: density = solid fraction + cut + overlap.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Solid, gas and radiation of a study: what they need, and the conductivities that follow from them."""
+"""Solid, gas and radiation of a study: required keys, and the conductivities that follow from them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Derived = dict[str, tuple[tuple[str, ...], Floats]]
 
 
 def check_conditions(study: Study) -> None:
-    """Refuse a gas, a solid or radiation without what it needs, and what is out of the range of its data.
+    """Refuse a gas, a solid or radiation that lacks a key, and conditions beyond the range of its data.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The tables of a study file: the words, what they allow, and what they exclude.
+"""The tables of a study file: keys, allowed values, and keys that exclude each other.
 
 The physical values of a table come from `etc_engine.study.quantities`, one row each.
 """
@@ -47,7 +47,7 @@ def _known_solid(found: str | dict[str, Any]) -> str | dict[str, Any]:
 
 
 def unknown_method(engine: str, method: str, allowed: Iterable[str]) -> str:
-    """What is wrong with a method, in words."""
+    """The reason why a method is refused."""
     cure = f"; write engine = {method!r}" if method in ENGINES else ""
     return f"method: found {method!r}, allowed with {engine}: {', '.join(allowed)}{cure}"
 

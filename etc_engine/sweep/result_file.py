@@ -94,7 +94,7 @@ def open_dataset(path: Path) -> xarray.Dataset:
 
 
 def load_netcdf(path: Path) -> xarray.Dataset:
-    """What is in a netCDF file, its checksum verified where it has one.
+    """Content of a netCDF file, its checksum verified where it has one.
 
     Raises
     ------

@@ -301,7 +301,7 @@ def _compute_together(round_: _Round, communicator: Communicator, stop: StopRequ
 
 
 def run_unit(study: Study, spec: RealizationSpec, unit: Unit, rank: int, realize: Realize) -> Record:
-    """One realization; what it raises becomes its result.
+    """One realization; an error that it raises becomes its result.
 
     Raises
     ------

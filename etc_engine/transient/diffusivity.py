@@ -153,7 +153,8 @@ def effective_diffusivity(
     method : str
         As in `etc_engine.engines.pipe.steady.pipe_conductivity`.
     heated : str
-        The wall of the step, ``left`` or ``right``. What is not homogeneous counts more near it: the two differ.
+        The wall of the step, ``left`` or ``right``. Particles near it weigh more, so that the two walls give
+        different values for an inhomogeneous packing.
     tolerance : float
         Of the adaptive steps, over the step of the wall's temperature.
 

@@ -79,7 +79,7 @@ class Transient:
 
 @dataclass(frozen=True, eq=False)
 class _Course:
-    """A study made ready: what its states are, and the march from one of them, or from the start."""
+    """A study made ready: its states, and the march from the start or from one of them."""
 
     network: ContactNetwork
     system: ParticleSystem
@@ -272,7 +272,7 @@ def _fraction(progress: Progress | None, begin: float, end: float) -> Progress |
 
 
 def _particles(study: NetworkStudy, folder: Path) -> ParticleTable:
-    """The packing, and what its file says of each particle."""
+    """The packing, and the columns of its file."""
     words = study.packing
     if isinstance(words, FileTable):
         path = folder / words.files

@@ -1,4 +1,4 @@
-"""What is read from a solution: temperatures and fluxes at points, means, heat inflow, boundary residual."""
+"""Quantities of a solution: temperatures and fluxes at points, means, heat inflow, boundary residual."""
 
 from __future__ import annotations
 

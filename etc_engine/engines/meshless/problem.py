@@ -47,7 +47,7 @@ class Dirichlet:
 
     @property
     def data(self) -> Data:
-        """What is prescribed."""
+        """The prescribed value."""
         return self.temperature
 
     @property
@@ -81,7 +81,7 @@ class Neumann:
 
     @property
     def data(self) -> Data:
-        """What is prescribed."""
+        """The prescribed value."""
         return self.flux_in
 
     @property
@@ -125,7 +125,7 @@ class Convective:
 
     @property
     def data(self) -> Data:
-        """What is prescribed."""
+        """The prescribed value."""
         return self.ambient
 
     @property

@@ -121,7 +121,7 @@ def solve_cell(
     With perfect conductors the resistivities are solved for fluxes, which is the same discrete problem seen from its
     other side. `tolerance` bounds the change of the polarization with Eyre-Milton, to which the error of the
     conductivity is proportional; conjugate gradients estimate that error itself, which is the square of the
-    residual's, and need about half the iterations for it. Where voxels insulate, what is below 1e-8 of the largest
+    residual's, and need about half the iterations for it. Where voxels insulate, values below 1e-8 of the largest
     conductivity is rounding, and returned as 0 with no error. So is the conductivity along an axis along which the
     conducting voxels join over corners or edges alone: the discrete operator lets heat through those, which falls
     with the logarithm of the voxel only.

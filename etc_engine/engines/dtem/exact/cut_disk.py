@@ -1,6 +1,6 @@
 r"""The Neumann problem of a disk cut by several chords, from those of its lunes.
 
-The temperature is a sum of lune solutions, one a chord, T = sum_j N_j[q_j]. Each satisfies the insulated arc
+The temperature is a sum of lune solutions, one for each chord, T = sum_j N_j[q_j]. Each satisfies the insulated arc
 exactly; the flux through chord i is q_i, plus what the other solutions send through it, and must be phi_i:
 
     q_i + sum_(j /= i) K_ij q_j = phi_i.

@@ -247,7 +247,7 @@ def _fill(
     values: Floats,
     points: ChordPoints,
 ) -> int:
-    """Fill the packed matrices; answers the first particle whose H is not positive definite, or -1."""
+    """Fill the packed matrices; returns the first particle whose H is not positive definite, or -1."""
     for p in range(side_offsets.size - 1):
         first, contacts = chords.offsets[p], side_offsets[p + 1] - side_offsets[p]
         size = contacts * modes

@@ -1,4 +1,4 @@
-r"""How far the temperatures of ``exact`` are from continuous, and what it costs in energy to make them so.
+r"""Jumps of the temperature of ``exact`` across contacts, and the energy of removing them.
 
 The fluxes of the method balance in every disk and across every contact; its temperatures T_p, harmonic in every
 disk, agree across a contact in the mean over every flux mode, but jump by J(s) in between: beyond r q(s), where the

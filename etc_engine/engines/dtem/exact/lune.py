@@ -1,7 +1,7 @@
 r"""The Neumann problem of a disk cut by one chord, exactly: the building block of method ``exact``.
 
 A unit disk with centre O is cut by the chord z(s) = (cos alpha + i s sin alpha) e^{i theta}, -1 <= s <= 1. The
-map w = ln((z - c_1)/(c_2 - z)) takes what is left, a lune, to the strip 0 < Im w < pi - alpha: the chord to the
+map w = ln((z - c_1)/(c_2 - z)) takes the rest, a lune, to the strip 0 < Im w < pi - alpha: the chord to the
 lower side, Re w = chi = ln((1 + s)/(1 - s)), the arc to the upper one, O to i (pi - 2 alpha). There the
 temperature of a flux density q on the chord, balanced by a sink at O, is known:
 
