@@ -64,6 +64,10 @@ def test_strip_matrix_equals_the_energy_of_the_field_in_the_plane(h, radius, s0,
     local = np.empty((8, 8))
     strip_matrix(h, h - radius, radius, s0, s1, 1.7, 8, local)
 
+    plain = np.empty((8, 8))
+    strip_matrix(h, h - radius, radius, s0, s1, 1.7, 6, plain)
+    assert np.array_equal(plain[:6, :6], local[:6, :6])  # without the coefficients of a resisting contact
+
     def field(s, t):
         low, high = (s1 - s) / (s1 - s0), (s - s0) / (s1 - s0)
         w, m, v = low * x[0] + high * x[2], low * x[1] + high * x[3], low * x[6] + high * x[7]
