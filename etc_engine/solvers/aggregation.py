@@ -1,17 +1,18 @@
-"""Smoothed-aggregation hierarchy on plain CSR matrices, out of PyAMG's parts.
+"""Smoothed-aggregation hierarchy on plain CSR matrices, with PyAMG's aggregates.
 
-PyAMG's own set-up keeps prolongators as block matrices of 1 x 1 blocks; sorting those takes more than half of its
-time on contact networks, and the cycle runs slower on them too. The mathematics here is the same.
+PyAMG's own set-up stores the strong entries with their values, the product of the matrix and the tentative
+prolongator, and that of the matrix and the prolongator. The kernels here store none of them. The mathematics is the
+same.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from scipy.sparse import csr_matrix
+from numba import njit
+from scipy.sparse import csr_array, csr_matrix
 
-from etc_engine.arrays import Floats
+from etc_engine.arrays import Floats, Ints
+from etc_engine.solvers.cycle import Level, VCycle
 
 STRENGTH = 0.08
 """Entries below this part of the geometric mean of their diagonals do not aggregate."""
@@ -26,12 +27,11 @@ COARSEST = 500
 MOST_LEVELS = 20
 
 
-def aggregation_hierarchy(matrix: csr_matrix) -> Any:
-    """A `pyamg.MultilevelSolver` for a symmetric positive definite matrix.
+def aggregation_hierarchy(matrix: csr_matrix) -> VCycle:
+    """The V-cycle of a symmetric positive definite matrix.
 
     Aggregates of strongly connected unknowns carry the constant; the prolongator is smoothed by one Jacobi sweep,
-    P = (I - w D^-1 A) T with D the absolute row sums; coarse matrices are P^T A P. One forward Gauss-Seidel sweep
-    goes before the coarse correction and one backward sweep after it, so that the V-cycle is symmetric.
+    P = (I - w D^-1 A) T with D the absolute row sums; coarse matrices are P^T A P. `VCycle` smooths with Gauss-Seidel.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def aggregation_hierarchy(matrix: csr_matrix) -> Any:
 
     Returns
     -------
-    pyamg.multilevel.MultilevelSolver
+    VCycle
 
     Notes
     -----
@@ -50,54 +50,198 @@ def aggregation_hierarchy(matrix: csr_matrix) -> Any:
     Vanek, Mandel, Brezina 1996, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
     problems, Computing 56, doi:10.1007/BF02238511.
     """
-    from pyamg.multilevel import MultilevelSolver
-    from pyamg.relaxation.smoothing import change_smoothers
-
-    levels = []
-    current, near_kernel = _sorted(matrix), np.ones(matrix.shape[0])  # aggregates follow the order of columns
-    while True:
-        level = MultilevelSolver.Level()
-        level.A = current
-        levels.append(level)
-        if current.shape[0] <= COARSEST or len(levels) == MOST_LEVELS:
-            break
-        dense = len(levels) > 1 and current.nnz > DENSE * current.shape[0]
-        tentative, coarse_kernel = _tentative(current, near_kernel, WEAK if dense else STRENGTH)
-        if tentative.shape[1] >= current.shape[0]:
+    levels: list[Level] = []
+    # aggregates follow the order of columns, and so does the cycle
+    current = matrix if matrix.has_sorted_indices else matrix.sorted_indices()
+    near_kernel = np.ones(matrix.shape[0])
+    while current.shape[0] > COARSEST and len(levels) < MOST_LEVELS - 1:
+        dense = len(levels) > 0 and current.nnz > DENSE * current.shape[0]
+        aggregates, count = _aggregates(current, WEAK if dense else STRENGTH)
+        if not 0 < count < current.shape[0]:
             break  # nothing aggregates any more
-        near_kernel = coarse_kernel
-        level.P = _smoothed(current, tentative)
-        level.R = level.P.T  # shares its memory; the sums of its products run in the same order as in rows
-        current = _sorted(csr_matrix(level.R.tocsr() @ (current @ level.P)))
-    hierarchy = MultilevelSolver(levels, coarse_solver="splu")
-    change_smoothers(hierarchy, ("gauss_seidel", {"sweep": "forward"}), ("gauss_seidel", {"sweep": "backward"}))
-    return hierarchy
+        inside = aggregates >= 0
+        norms = np.sqrt(np.bincount(aggregates[inside], near_kernel[inside] ** 2, minlength=count))
+        values = near_kernel / norms[aggregates]  # those outside are not read
+        prolongator = csr_matrix(
+            _prolongator(current.indptr, current.indices, current.data, aggregates, values, count)[::-1],
+            shape=(current.shape[0], count),
+        )
+        levels.append(Level(current, prolongator))
+        current = _coarse_matrix(current, prolongator)
+        near_kernel = norms
+    return VCycle(tuple(levels), current)
 
 
-def _sorted(matrix: csr_matrix) -> csr_matrix:
-    """The matrix itself where the columns of each row are in order, else a copy in order."""
-    return matrix if matrix.has_sorted_indices else matrix.sorted_indices()
-
-
-def _tentative(matrix: csr_matrix, near_kernel: Floats, strength: float) -> tuple[csr_matrix, Floats]:
-    """Prolongator of orthonormal columns, one an aggregate, that carries the near kernel, and that of its level."""
+def _aggregates(matrix: csr_matrix, strength: float) -> tuple[Ints, int]:
+    """Aggregate of each unknown, -1 where no entry of its row is strong, and their number."""
     from pyamg.aggregation.aggregate import standard_aggregation
-    from pyamg.strength import symmetric_strength_of_connection
 
-    aggregates = standard_aggregation(symmetric_strength_of_connection(matrix, theta=strength))[0].tocsr()
-    values = near_kernel[np.repeat(np.arange(matrix.shape[0]), np.diff(aggregates.indptr))]
-    norms = np.sqrt(np.bincount(aggregates.indices, values**2, minlength=aggregates.shape[1]))
-    tentative = csr_matrix(
-        (values / norms[aggregates.indices], aggregates.indices, aggregates.indptr), aggregates.shape
+    indptr, indices = _strong(matrix.indptr, matrix.indices, matrix.data, matrix.diagonal(), strength)
+    pattern = csr_array((np.ones(len(indices), np.int8), indices, indptr), shape=matrix.shape)
+    members = standard_aggregation(pattern)[0].tocsr()
+    aggregates = np.full(matrix.shape[0], -1, dtype=matrix.indices.dtype)
+    aggregates[np.diff(members.indptr) > 0] = members.indices[: members.nnz]
+    return aggregates, members.shape[1] if members.nnz else 0
+
+
+def _coarse_matrix(matrix: csr_matrix, prolongator: csr_matrix) -> csr_matrix:
+    """P^T A P, its columns in order."""
+    across = prolongator.tocsc()  # the rows of P^T
+    count = prolongator.shape[1]
+    data, indices, indptr = _galerkin(
+        matrix.indptr,
+        matrix.indices,
+        matrix.data,
+        prolongator.indptr,
+        prolongator.indices,
+        prolongator.data,
+        across.indptr,
+        across.indices,
+        across.data,
     )
-    return tentative, norms
+    coarse = csr_matrix((data, indices, indptr), shape=(count, count))
+    coarse.sort_indices()
+    return coarse
 
 
-def _smoothed(matrix: csr_matrix, tentative: csr_matrix) -> csr_matrix:
-    """One damped Jacobi sweep on every column."""
-    correction = csr_matrix(matrix @ tentative)
-    sizes = csr_matrix((np.abs(matrix.data), matrix.indices, matrix.indptr), matrix.shape, copy=False)
-    rows = np.asarray(sizes.sum(axis=1)).ravel()
-    del sizes
-    correction.data *= np.repeat(DAMPING / rows, np.diff(correction.indptr))
-    return csr_matrix(tentative - correction)
+@njit(cache=True)
+def _strong(indptr: Ints, indices: Ints, data: Floats, diagonal: Floats, strength: float) -> tuple[Ints, Ints]:
+    """Pattern of the diagonal and of the entries with a_ij^2 >= strength^2 |a_ii a_jj|."""
+    rows = diagonal.size
+    square = strength * strength
+    starts = np.zeros(rows + 1, indices.dtype)
+    columns = np.empty(0, indices.dtype)
+    for fill in range(2):
+        found = 0
+        for i in range(rows):
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                if i == j or data[k] * data[k] >= square * abs(diagonal[i] * diagonal[j]):
+                    if fill:
+                        columns[found] = j
+                    found += 1
+            starts[i + 1] = found
+        if not fill:
+            columns = np.empty(found, indices.dtype)
+    return starts, columns
+
+
+@njit(cache=True)
+def _prolongator(
+    indptr: Ints, indices: Ints, data: Floats, aggregates: Ints, values: Floats, count: int
+) -> tuple[Ints, Ints, Floats]:
+    """P = (I - w D^-1 A) T, row by row; column J of T holds the values of the unknowns in aggregate J."""
+    rows = aggregates.size
+    last_row = np.full(count, -1, indices.dtype)
+    starts = np.zeros(rows + 1, indices.dtype)
+    found = 0
+    for i in range(rows):
+        if aggregates[i] >= 0:
+            last_row[aggregates[i]] = i
+            found += 1
+        for k in range(indptr[i], indptr[i + 1]):
+            column = aggregates[indices[k]]
+            if column >= 0 and last_row[column] != i:
+                last_row[column] = i
+                found += 1
+        starts[i + 1] = found
+    columns = np.empty(found, indices.dtype)
+    entries = np.empty(found)
+    place = np.full(count, -1, indices.dtype)
+    for i in range(rows):
+        first = starts[i]
+        at = first
+        size = 0.0
+        for k in range(indptr[i], indptr[i + 1]):
+            size += abs(data[k])
+        if aggregates[i] >= 0:
+            place[aggregates[i]] = at
+            columns[at] = aggregates[i]
+            entries[at] = values[i]
+            at += 1
+        for k in range(indptr[i], indptr[i + 1]):
+            column = aggregates[indices[k]]
+            if column < 0:
+                continue
+            term = -DAMPING / size * data[k] * values[indices[k]]
+            if place[column] >= first:
+                entries[place[column]] += term
+            else:
+                place[column] = at
+                columns[at] = column
+                entries[at] = term
+                at += 1
+    return starts, columns, entries
+
+
+@njit(cache=True)
+def _galerkin(
+    indptr: Ints,
+    indices: Ints,
+    data: Floats,
+    fine_starts: Ints,
+    fine_columns: Ints,
+    fine_entries: Floats,
+    coarse_starts: Ints,
+    coarse_rows: Ints,
+    coarse_entries: Floats,
+) -> tuple[Floats, Ints, Ints]:
+    """Rows of P^T A P, by way of one row of P^T A at a time; the arguments are A, the rows of P and those of P^T."""
+    count = coarse_starts.size - 1
+    most = 0
+    for row in range(count):
+        terms = 0
+        for t in range(coarse_starts[row], coarse_starts[row + 1]):
+            terms += indptr[coarse_rows[t] + 1] - indptr[coarse_rows[t]]
+        most = max(most, terms)
+    near = np.empty(most, indices.dtype)  # columns of the row of P^T A, and its entries
+    weights = np.empty(most)
+    near_place = np.full(fine_starts.size - 1, -1, indices.dtype)
+    row_columns = np.empty(count, indices.dtype)
+    sums = np.empty(count)
+    last_row = np.full(count, -1, indices.dtype)
+    columns = np.empty(indices.size // 4 + 1024, indices.dtype)
+    entries = np.empty(columns.size)
+    starts = np.zeros(count + 1, indices.dtype)
+    for row in range(count):
+        reached = 0
+        for t in range(coarse_starts[row], coarse_starts[row + 1]):
+            i = coarse_rows[t]
+            entry = coarse_entries[t]
+            for k in range(indptr[i], indptr[i + 1]):
+                j = indices[k]
+                place = near_place[j]
+                if 0 <= place < reached and near[place] == j:
+                    weights[place] += entry * data[k]
+                else:
+                    near_place[j] = reached
+                    near[reached] = j
+                    weights[reached] = entry * data[k]
+                    reached += 1
+        found = 0
+        for q in range(reached):
+            j = near[q]
+            weight = weights[q]
+            for m in range(fine_starts[j], fine_starts[j + 1]):
+                column = fine_columns[m]
+                if last_row[column] == row:
+                    sums[column] += weight * fine_entries[m]
+                else:
+                    last_row[column] = row
+                    sums[column] = weight * fine_entries[m]
+                    row_columns[found] = column
+                    found += 1
+        at = starts[row]
+        if at + found > columns.size:
+            room = at + found + columns.size // 2
+            more_columns, more_entries = np.empty(room, indices.dtype), np.empty(room)
+            for q in range(at):
+                more_columns[q] = columns[q]
+                more_entries[q] = entries[q]
+            columns, entries = more_columns, more_entries
+        for q in range(found):
+            columns[at + q] = row_columns[q]
+            entries[at + q] = sums[row_columns[q]]
+        starts[row + 1] = at + found
+    total = starts[count]
+    return entries[:total].copy(), columns[:total].copy(), starts

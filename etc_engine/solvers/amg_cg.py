@@ -132,7 +132,7 @@ def build_preconditioner(matrix: csr_matrix, exact_level: int = EXACT_LEVEL) -> 
         apply, levels = _factorise(matrix), 1
     else:
         hierarchy = aggregation_hierarchy(matrix)
-        apply, levels = hierarchy.aspreconditioner(cycle="V").matvec, len(hierarchy.levels)
+        apply, levels = hierarchy.apply, len(hierarchy)
     return Preconditioner(apply, levels, time.perf_counter() - start)
 
 
@@ -211,6 +211,7 @@ def solve_energy(
     p = z.copy()
     rho = dot(r, z)
     rhs_norm = math.sqrt(dot(rhs, rhs)) or 1.0
+    scaled = np.empty_like(rhs)
     uniform = np.ones_like(rhs) if conserved is None else conserved
     steps: list[float] = []
     ratios: list[float] = []
@@ -239,14 +240,14 @@ def solve_energy(
         if not (rho > 0.0 and curvature > 0.0):
             break
         steps.append(rho / curvature)
-        u += steps[-1] * p
-        r -= steps[-1] * q
+        u += np.multiply(p, steps[-1], out=scaled)
+        r -= np.multiply(q, steps[-1], out=scaled)
         history.append(math.sqrt(dot(r, r)) / rhs_norm)
         z = preconditioner.apply(r)
         rho_next = dot(r, z)
         ratios.append(rho_next / rho)
         # E_lift - 2 b.u + u.K u, which holds for any iterate
-        energy = max(lift_energy - dot(u, rhs + r), ROUND_OFF * lift_energy)
+        energy = max(lift_energy - dot(u, np.add(rhs, r, out=scaled)), ROUND_OFF * lift_energy)
         ritz = smallest_ritz_value(steps, ratios)
         mu = min(0.5 * ritz, np.inf if limits.spectral_floor is None else limits.spectral_floor)
         error = max(radau_factor(steps, ratios, mu) * rho_next, 0.0) / energy

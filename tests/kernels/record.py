@@ -112,6 +112,8 @@ OTHERS = (
     f"homogenize thin.csv --box 1,1,1 --boundary walls {MATRIX} --resolution 24",
     f"homogenize loose.csv --box 1,1 --boundary walls {MATRIX} --resolution 40",
     f"homogenize loose.csv --box 1,1 --periodic xy {MATRIX} --resolution 40 --solver eyre-milton",
+    "pack --radii uniform:0.003:0.006 --box 1,1 --seed 3 -o many.csv",  # enough unknowns for multigrid
+    "solve many.csv --box 1,1 --contact-angle 5 --json",
     "sweep disks.toml -o disks.nc",
     "sweep front.toml -o front.nc",
     "sweep spheres.toml -o spheres.nc",
