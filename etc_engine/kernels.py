@@ -19,6 +19,11 @@ from typing import Any, NamedTuple
 from etc_engine.errors import OutputError
 
 LIST = Path(__file__).with_suffix(".jsonl")
+NOWHERE = (
+    "compiled kernels can be kept neither beside the package nor in the home folder: set NUMBA_CACHE_DIR to a folder "
+    "that can be written"
+)
+"""What to do where numba says "no locator available"."""
 
 
 class Kernel(NamedTuple):
@@ -139,6 +144,8 @@ def compile_all(jobs: int) -> Iterator[bool]:
                 yield future.result()
             except (BrokenExecutor, OSError, RuntimeError) as error:
                 pool.shutdown(cancel_futures=True)
+                if "no locator available" in str(error):
+                    raise OutputError(NOWHERE) from error
                 raise OutputError(f"kernels cannot be compiled and kept: {error}") from error
 
 

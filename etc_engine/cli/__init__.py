@@ -40,11 +40,6 @@ COMMANDS = {
     "fetch": "etc_engine.cli.fetch:fetch_command",
 }
 
-NOWHERE = (
-    "compiled kernels can be kept neither beside the package nor in the home folder: set NUMBA_CACHE_DIR to a folder "
-    "that can be written"
-)
-
 EXIT_DONE = 0
 EXIT_BUG = 1
 EXIT_REFUSED = 2
@@ -135,6 +130,8 @@ def _run(arguments: Sequence[str] | None) -> int:
             raise
         what = f"unexpected {type(error).__name__}: {error}"
         if "no locator available" in what:  # the words of numba
+            from etc_engine.kernels import NOWHERE
+
             what = NOWHERE
         return _refuse(f"{what} (set ETC_ENGINE_TRACEBACK=1 to see where)", EXIT_BUG)
     return status if isinstance(status, int) else EXIT_DONE

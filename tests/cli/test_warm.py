@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from etc_engine import kernels
+from etc_engine.errors import OutputError
 
 ROOT = Path(kernels.__file__).parent
 RECORD = Path(__file__).parents[1] / "kernels"
@@ -71,6 +72,17 @@ def test_a_process_that_is_killed_is_one_line(tmp_path, monkeypatch):
     assert done.returncode == 2
     assert done.stderr.startswith("etc-engine: kernels cannot be compiled and kept: ")
     assert len(done.stderr.splitlines()) == 1
+
+
+def refuse_to_compile(kernel):
+    raise RuntimeError(f"cannot cache function '{kernel.name}': no locator available for file 'kernels.py'")
+
+
+def test_no_folder_for_kernels_is_said_with_what_to_do(monkeypatch):
+    monkeypatch.setattr(kernels, "compile_kernel", refuse_to_compile)
+    monkeypatch.setattr(kernels, "listed_kernels", lambda: LISTED[:2])
+    with pytest.raises(OutputError, match="set NUMBA_CACHE_DIR to a folder"):
+        list(kernels.compile_all(1))
 
 
 @pytest.mark.slow
