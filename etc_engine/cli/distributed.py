@@ -172,6 +172,7 @@ def _record(
         "particles": census.particles,
         "density": census.density,
         **({} if census.filling.fill_height is None else {"fill_height": census.filling.fill_height}),
+        **({} if conductivity is None else {"particle_conductivity": float(conductivity)}),
         "pore_conductivity": 0.0,
         "contact_rule": asked.rule,
         **asked.physics.record,

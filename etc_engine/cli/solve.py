@@ -129,7 +129,7 @@ def solve_command(
         linked = field.medium
     else:  # in pores that conduct, heat takes more links than the contacts
         linked = linked_medium(medium, result, engine=engine.name, method=method, axis=axes[0])
-    record = {**_record(asked, method, result, linked, axes), **between}
+    record = {**_record(asked, method, result, linked, axes, uniform=table.conductivity is None), **between}
     if field is not None and full:
         each = zip(field.medium.links.pairs.tolist(), field.contact_temperatures.tolist(), strict=True)
         record["contact_temperatures"] = [{"particles": pair, "temperature": value} for pair, value in each]
@@ -176,7 +176,13 @@ def _with_gap(
 
 
 def _record(
-    asked: SolveRequest, method: str, result: EffectiveConductivity[Any], medium: Medium, axes: tuple[int, ...]
+    asked: SolveRequest,
+    method: str,
+    result: EffectiveConductivity[Any],
+    medium: Medium,
+    axes: tuple[int, ...],
+    *,
+    uniform: bool,
 ) -> dict[str, Any]:
     import numpy as np
 
@@ -201,6 +207,7 @@ def _record(
         "particles": medium.packing.count,
         "density": medium.packing.density,
         **({} if height is None else {"fill_height": height}),
+        **({"particle_conductivity": float(medium.conductivity[0])} if uniform else {}),
         "pore_conductivity": medium.pores.conductivity,
         "contact_rule": network.rule,
         **({"contact_resistance": asked.contact_resistance} if asked.contact_resistance else {}),

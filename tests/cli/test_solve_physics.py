@@ -66,6 +66,8 @@ def test_a_material_at_its_temperature(bed, capfd):
     one = solved(capfd, *bed)
     steel = solved(capfd, *bed, "--material", "SS316", "--temperature", "600")
     assert steel["conductivity"] / one["conductivity"] == pytest.approx(19.9756, rel=1e-4)
+    assert steel["particle_conductivity"] == pytest.approx(19.9756, rel=1e-4)
+    assert one["particle_conductivity"] == 1.0
 
 
 def test_what_touches_is_judged_by_the_rule(tmp_path, capfd):
