@@ -12,7 +12,7 @@ import os
 from collections.abc import Collection, Iterator
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor, as_completed
 from importlib import import_module
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -137,7 +137,8 @@ def compile_all(jobs: int) -> Iterator[bool]:
     OutputError
         If a kernel cannot be compiled or kept.
     """
-    with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
+    quickest = "fork" if "fork" in get_all_start_methods() else "spawn"  # Windows cannot fork
+    with ProcessPoolExecutor(jobs, get_context(quickest)) as pool:
         started = [pool.submit(compile_kernel, kernel) for kernel in listed_kernels()]
         for future in as_completed(started):
             try:
