@@ -31,6 +31,9 @@ from etc_engine.solvers.summation import dot
 # Below this many unknowns one sparse factorisation is faster than a multigrid hierarchy.
 EXACT_LEVEL = 20_000
 
+# A matrix of at most so many unknowns is factorised where multigrid stalls: some GB for spheres.
+LAST_RESORT = 200_000
+
 # An energy below this part of the lift's is round-off of zero; errors are then relative to this.
 ROUND_OFF = 1e-13
 
@@ -282,8 +285,12 @@ def solve_loads(
     tolerance: float = 1e-10,
     conserved: Floats | None = None,
     limits: Limits = DEFAULT_LIMITS,
+    last_resort: int = LAST_RESORT,
 ) -> tuple[Floats, tuple[SolveReport, ...]]:
     """Solve K u_a = b_a for all loads a of one matrix, with one preconditioner.
+
+    Multigrid stalls where neighbours differ in conductivity by many orders of magnitude. Without a given
+    preconditioner the matrix is factorised then.
 
     Parameters
     ----------
@@ -296,6 +303,8 @@ def solve_loads(
         Starting guesses; a load without a right-hand side starts from zero.
     preconditioner, tolerance, conserved, limits
         As in `solve_energy`.
+    last_resort : int
+        Largest matrix that is factorised where multigrid stalls.
 
     Returns
     -------
@@ -309,24 +318,36 @@ def solve_loads(
     """
     if matrix.shape[0] == 0:
         return np.zeros(rhs.shape), (NO_SOLVE,) * rhs.shape[1]
-    preconditioner = preconditioner or build_preconditioner(matrix)
-    u = np.empty(rhs.shape)
-    reports = []
-    for load, lift_energy in enumerate(lift_energies):
-        b = np.ascontiguousarray(rhs[:, load])
-        start = None if initial is None or not b.any() else np.ascontiguousarray(initial[:, load])
-        u[:, load], report = solve_energy(
-            matrix,
-            b,
-            float(lift_energy),
-            preconditioner=preconditioner,
-            initial=start,
-            tolerance=tolerance,
-            conserved=conserved,
-            limits=limits,
-        )
-        reports.append(report)
-    return u, tuple(reports)
+
+    def solve_each(chosen: Preconditioner) -> tuple[Floats, tuple[SolveReport, ...]]:
+        u = np.empty(rhs.shape)
+        reports = []
+        for load, lift_energy in enumerate(lift_energies):
+            b = np.ascontiguousarray(rhs[:, load])
+            start = None if initial is None or not b.any() else np.ascontiguousarray(initial[:, load])
+            u[:, load], report = solve_energy(
+                matrix,
+                b,
+                float(lift_energy),
+                preconditioner=chosen,
+                initial=start,
+                tolerance=tolerance,
+                conserved=conserved,
+                limits=limits,
+            )
+            reports.append(report)
+        return u, tuple(reports)
+
+    if preconditioner is not None:
+        return solve_each(preconditioner)
+    built = build_preconditioner(matrix)
+    try:
+        return solve_each(built)
+    except ConvergenceError:
+        if built.levels == 1 or matrix.shape[0] > last_resort:
+            raise
+    del built
+    return solve_each(build_preconditioner(matrix, matrix.shape[0]))
 
 
 def _balance(matrix: csr_matrix, rhs: Floats, u: Floats, uniform: Floats) -> float:

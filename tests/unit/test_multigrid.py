@@ -7,7 +7,7 @@ from scipy.sparse import block_diag, csr_matrix, diags_array, identity, kron
 from etc_engine.errors import ConvergenceError
 from etc_engine.solvers import aggregation
 from etc_engine.solvers.aggregation import aggregation_hierarchy
-from etc_engine.solvers.amg_cg import build_preconditioner, solve_energy
+from etc_engine.solvers.amg_cg import EXACT_LEVEL, build_preconditioner, solve_energy, solve_loads
 
 
 def grid(edge: int, weak: float = 1.0) -> csr_matrix:
@@ -108,3 +108,35 @@ def test_a_matrix_that_is_not_positive_definite_is_reported():
     matrix[10, 10] = 0.0
     with pytest.raises(ConvergenceError, match="not positive definite"):
         solve_energy(matrix, np.ones(1600), 1e3, preconditioner=build_preconditioner(matrix, 0))
+
+
+def test_a_matrix_on_which_multigrid_stalls_is_factorised():
+    """A square of 160 x 160 conductors, each with a conductivity of its own between 1e-6 and 1e6."""
+    edge = 160
+    conductance = 10.0 ** np.random.default_rng(8).uniform(-6.0, 6.0, edge * edge)
+    number = np.arange(edge * edge).reshape(edge, edge)
+    pairs = np.vstack(
+        [
+            np.column_stack((number[:, :-1].ravel(), number[:, 1:].ravel())),
+            np.column_stack((number[:-1].ravel(), number[1:].ravel())),
+        ]
+    )
+    series = 1.0 / (1.0 / conductance[pairs[:, 0]] + 1.0 / conductance[pairs[:, 1]])
+    incidence = csr_matrix(
+        (np.tile([1.0, -1.0], len(pairs)), (np.repeat(np.arange(len(pairs)), 2), pairs.ravel())),
+        shape=(len(pairs), edge * edge),
+    )
+    held = np.zeros(edge * edge)
+    held[:edge] = held[-edge:] = conductance[:edge]
+    matrix = csr_matrix(incidence.T @ diags_array(series) @ incidence + diags_array(held))
+    matrix.sort_indices()
+    load = np.where(np.arange(edge * edge) < edge, held, 0.0)[:, None]
+    lift = np.array([held[:edge].sum()])
+    assert matrix.shape[0] > EXACT_LEVEL
+    with pytest.raises(ConvergenceError):
+        solve_loads(matrix, load, lift, last_resort=EXACT_LEVEL)
+    u, (report,) = solve_loads(matrix, load, lift)
+    assert report.levels == 1
+    flows = held * (np.where(np.arange(edge * edge) < edge, 1.0, 0.0) - u[:, 0])
+    assert flows[:edge].sum() == pytest.approx(-flows[-edge:].sum(), rel=1e-6)
+    assert -1e-9 <= u.min() <= u.max() <= 1.0 + 1e-9

@@ -14,13 +14,9 @@ from etc_engine.engines.dtem.cell.assembly import CellMaterials, CellSystem, ass
 from etc_engine.engines.dtem.cell.frame import Frame
 from etc_engine.engines.dtem.cell.geometry import CellGeometry, Resolution, divide
 from etc_engine.engines.dtem.cell.rim_grid import EdgeGrid
-from etc_engine.errors import ConvergenceError
-from etc_engine.solvers import SolveReport, build_preconditioner, solve_loads
+from etc_engine.solvers import SolveReport, solve_loads
 
 Floats = NDArray[np.float64]
-
-EXACT_LEVEL = 20_000
-"""Frames of at most so many unknowns are factorised; larger ones go through multigrid, and only if it fails too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,12 +171,7 @@ def solve_model(model: CellModel, axes: tuple[int, ...], *, tolerance: float = 1
     if free.size:
         matrix = _free_part(system.matrix, held)
         rhs, lifts = -loads[free], np.diag(lift)
-        try:
-            preconditioner = build_preconditioner(matrix, EXACT_LEVEL)
-            u, reports = solve_loads(matrix, rhs, lifts, preconditioner=preconditioner, tolerance=tolerance)
-        except ConvergenceError:  # a contrast so high that multigrid stalls
-            preconditioner = build_preconditioner(matrix, free.size)
-            u, reports = solve_loads(matrix, rhs, lifts, preconditioner=preconditioner, tolerance=tolerance)
+        u, reports = solve_loads(matrix, rhs, lifts, tolerance=tolerance, last_resort=free.size)
         fluctuations[free] = u
     lifted = fluctuations.T @ (system.matrix @ fluctuations)
     if model.geometry.box.periodic[axes[0]]:
