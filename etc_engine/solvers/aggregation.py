@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from scipy.sparse import csr_array, csr_matrix
+from scipy.sparse import csr_matrix
 
 from etc_engine.arrays import Floats, Ints
 from etc_engine.solvers.cycle import Level, VCycle
@@ -77,7 +77,7 @@ def _aggregates(matrix: csr_matrix, strength: float) -> tuple[Ints, int]:
     from pyamg.aggregation.aggregate import standard_aggregation
 
     indptr, indices = _strong(matrix.indptr, matrix.indices, matrix.data, matrix.diagonal(), strength)
-    pattern = csr_array((np.ones(len(indices), np.int8), indices, indptr), shape=matrix.shape)
+    pattern = csr_matrix((np.ones(len(indices), np.int8), indices, indptr), shape=matrix.shape)
     members = standard_aggregation(pattern)[0].tocsr()
     aggregates = np.full(matrix.shape[0], -1, dtype=matrix.indices.dtype)
     aggregates[np.diff(members.indptr) > 0] = members.indices[: members.nnz]
