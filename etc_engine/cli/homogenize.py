@@ -79,12 +79,14 @@ def homogenize_command(
     clock = Clock()
     import numpy as np
 
-    from etc_engine.cli.options import check_picture, check_place, print_json
+    from etc_engine.cli.options import check_netcdf, check_picture, check_place, print_json
     from etc_engine.errors import InputError
     from etc_engine.realization import effective_conductivity, find_engine
 
     if plot is not None:
         check_picture(plot)
+    if output is not None:
+        check_netcdf(output)
     for path in (output, plot):
         if path is not None:
             check_place(path, inclusions)

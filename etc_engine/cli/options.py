@@ -83,6 +83,23 @@ RESULT_MARKS = (b"study_digest", b"study_file")
 """Names of attributes that only the result of a whole study has."""
 
 
+FOREIGN = (".csv", ".dump", ".html", ".json", ".npy", ".pdf", ".png", ".svg", ".toml", ".txt", ".vtk", ".vtp", ".xyz")
+"""Endings of files that are no netCDF."""
+
+
+def check_netcdf(path: Path) -> None:
+    """Refuse the ending of another format for a file that is written as netCDF.
+
+    Raises
+    ------
+    OutputError
+    """
+    if path.suffix.lower() in FOREIGN:
+        raise OutputError(
+            f"the output is written as netCDF: name it {path.with_suffix('.nc').name}, found {path.name!r}"
+        )
+
+
 def check_place(path: Path, *inputs: Path, replaces_result: bool = False) -> None:
     """Refuse an output that cannot be written, or that would destroy an input or a result, before the work begins.
 

@@ -105,7 +105,14 @@ def solve_command(
     clock = Clock()
 
     from etc_engine.cli.options import print_json
-    from etc_engine.medium.sample_warnings import box_warnings, digit_warnings, excess_warnings, rarefied_warnings
+    from etc_engine.medium.sample_warnings import (
+        bare_wall_warnings,
+        box_warnings,
+        digit_warnings,
+        excess_warnings,
+        narrow_bond_warnings,
+        rarefied_warnings,
+    )
     from etc_engine.realization import field_along, find_engine
     from etc_engine.realization.engines import linked_medium
 
@@ -142,7 +149,8 @@ def solve_command(
     if dumped.contacts is None and not asked.closest:  # of the closest pairs there are as many, whatever the digits
         warn(digit_warnings(table, gap, bonded=asked.takes_gap))
     driven = [] if medium.pores.conduct else [axis for axis in axes if not medium.box.periodic[axis]]
-    warn(box_warnings(table, driven, gap))
+    narrow = narrow_bond_warnings(medium.links) if asked.bonded and not conduct else []
+    warn(box_warnings(table, driven, gap) + bare_wall_warnings(medium.links, driven, table.origin) + narrow)
     warn(
         rarefied_warnings(medium)
         + excess_warnings(result.tensor, medium.conductivity, medium.pores, result.model_error)

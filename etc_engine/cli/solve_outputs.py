@@ -18,7 +18,12 @@ PER_AXIS = ("conductivity", "conductivity_between_walls")
 """Values of a record that stand in it by axis."""
 
 
-LABELS = {"wall_contacts": "wall contacts on axis", "status_name": "status", "fill_height": "fill height [m]"}
+LABELS = {
+    "wall_contacts": "wall contacts on axis",
+    "status_name": "status",
+    "fill_height": "fill height [m]",
+    "model_error_estimate": "relative error estimate",
+}
 
 
 @dataclass(frozen=True)
@@ -36,9 +41,11 @@ class SolveOutputs:
 
     def check(self, particles: Path) -> None:
         """Refuse what cannot be written, or would replace the input, before the work begins."""
-        from etc_engine.cli.options import check_picture, check_place
+        from etc_engine.cli.options import check_netcdf, check_picture, check_place
         from etc_engine.errors import InputError
 
+        if self.netcdf is not None:
+            check_netcdf(self.netcdf)
         if self.plot is not None:
             check_picture(self.plot)
         if self.vtk is not None and self.vtk.suffix != ".vtp":
@@ -87,6 +94,8 @@ def write_outputs(outputs: SolveOutputs, field: ParticleField, record: dict[str,
 def print_table(record: dict[str, Any]) -> None:
     """Print a record, a line for each value."""
     labels = {name: LABELS.get(name, name.replace("_", " ")) for name in record}
+    if len(axes := list(record.get("conductivity_per_axis", ()))) > 1:
+        labels["conductivity"] = f"conductivity along {axes[0]}"
     width = max(24, 1 + max(map(len, labels.values())))
     for name, value in record.items():
         if name in ("contact_temperatures", "status"):  # the name of the status is printed

@@ -66,9 +66,11 @@ def sweep_command(
         raise click.UsageError("--dry-run is of the whole study: leave out --part")
     if output is not None and output.exists() and study.exists() and output.samefile(study):
         raise OutputError(f"the output {output} is the study file itself: choose another name")
-    if dry_run:
-        from etc_engine.cli.options import check_place  # loads numpy
+    from etc_engine.cli.options import check_netcdf, check_place
 
+    if output is not None:
+        check_netcdf(output)
+    if dry_run:
         if output is not None:
             check_place(output, replaces_result=True)
         return _connected(lambda communicator, engine: _foretell(study, output, communicator, engine), None)

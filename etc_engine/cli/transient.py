@@ -55,13 +55,14 @@ def transient_command(
 
 
 def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
-    from etc_engine.cli.options import check_place
+    from etc_engine.cli.options import check_netcdf, check_place
     from etc_engine.durable.files import replacing
     from etc_engine.study.meshless import run_study
 
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
             raise InputError(f"{name} is only valid with studies of kind 'network', this one is of kind 'meshless'")
+    check_netcdf(wanted.output)
     check_place(wanted.output, wanted.study, replaces_result=True)
     result = run_study(content, str(wanted.study))
     with replacing(wanted.output) as file:
@@ -136,13 +137,14 @@ def _warn_of_digits(study: NetworkStudy, done: Transient) -> None:
 
 def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
     """Refuse what cannot be written, or would replace an input, before the work begins."""
-    from etc_engine.cli.options import check_picture, check_place
+    from etc_engine.cli.options import check_netcdf, check_picture, check_place
     from etc_engine.output.series import check_vtk_series
     from etc_engine.study.transient import FileTable
 
     inputs = [wanted.study]
     if isinstance(study.packing, FileTable):
         inputs.append(wanted.study.parent / study.packing.files)
+    check_netcdf(wanted.output)
     if wanted.plot is not None:
         check_picture(wanted.plot)
     if wanted.vtk is not None:

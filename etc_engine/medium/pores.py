@@ -30,7 +30,11 @@ def check_conductivity(value: float, whose: str, *, perfect: bool = True) -> Non
     """
     if value == 0.0 or (perfect and value == np.inf) or SMALLEST <= value <= LARGEST:
         return
-    others = "0 for an insulator, or inf for a perfect conductor" if perfect else "or 0 for an insulator"
+    others = (
+        "or, with homogenize, 0 for an insulator and inf for a perfect conductor"
+        if perfect
+        else "or 0 for an insulator"
+    )
     raise InputError(
         f"the conductivity of {whose} is {value:g}: give a number of W/(m K) from {SMALLEST:g} to {LARGEST:g}, {others}"
     )

@@ -18,6 +18,9 @@ from etc_engine.structure.filling import Filling, find_filling, free_walls
 EXCESS = 0.005
 """An excess below this part is the error of a method that solves particles and pores of nearly equal conductivity."""
 
+BARE = 0.25
+"""A driven wall with less than this part of the contacts that fit on it is bare."""
+
 
 def digit_warnings(table: ParticleTable, gap: float, *, bonded: bool) -> list[str]:
     """Contacts that the printed digits of the file do not decide, in a sentence.
@@ -67,6 +70,57 @@ def box_warnings(table: ParticleTable, driven: Sequence[int], gap: float = 0.0) 
     """
     packing = table.packing
     return filling_warnings(find_filling(packing), packing.box, table.origin, driven, gap, table.cropped)
+
+
+def bare_wall_warnings(network: ContactNetwork, driven: Sequence[int], origin: tuple[float, ...] = ()) -> list[str]:
+    """Driven walls with few contacts: all heat then crosses a few particles, and the bulk conducts better than the box.
+
+    As many contacts fit on a wall as squares of the mean diameter (in 2D, as mean diameters). Walls without any
+    contact are those of `filling_warnings`.
+
+    Parameters
+    ----------
+    network : ContactNetwork
+        In pores that insulate.
+    driven : sequence of int
+        Axes along which walls drive the heat.
+    origin : tuple of float [m]
+        Low corner of the box in the coordinates of the file; empty stands for zeros.
+    """
+    box = network.packing.box
+    origin = origin or (0.0,) * box.dimension
+    diameter = 2.0 * float(network.packing.radii.mean())
+    found = []
+    for axis in driven:
+        across = np.delete(np.asarray(box.lengths), axis)
+        places = float(np.prod(across / diameter))
+        for wall in (2 * axis, 2 * axis + 1):
+            count = int(np.count_nonzero(network.walls == wall))
+            if 0 < count < BARE * places:
+                where = f"{AXES[axis]} = {origin[axis] + (wall % 2) * box.lengths[axis]:g}"
+                found.append(
+                    f"only {count} particles touch the driven wall {where}, where about {places:.0f} fit side by side: "
+                    "all heat crosses these, and the bulk conducts better than this box; see --crop and --periodic"
+                )
+    return found
+
+
+def narrow_bond_warnings(network: ContactNetwork) -> list[str]:
+    """Bonds narrower than the overlap of their particles: the bond is the contact, and the overlap does not count."""
+    radii = network.packing.radii[network.pairs]
+    apart = np.linalg.norm(network.branches, axis=1)
+    overlap = np.flatnonzero(apart < radii.sum(axis=1) * (1.0 - 1e-9))
+    apart, (own, other) = apart[overlap], radii[overlap].T
+    cosines = (apart**2 + own**2 - other**2) / (2.0 * apart * own)
+    wider = np.arccos(np.clip(cosines, -1.0, 1.0)) > network.angles[overlap, 0] * (1.0 + 1e-6)
+    if not (count := int(np.count_nonzero(wider))):
+        return []
+    pairs = (
+        "1 pair overlaps more widely than its bond"
+        if count == 1
+        else f"{count} pairs overlap more widely than their bonds"
+    )
+    return [f"{pairs}: the bond is the contact, not the overlap; to use the overlap leave the contact angle out"]
 
 
 def filling_warnings(

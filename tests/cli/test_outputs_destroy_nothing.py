@@ -14,6 +14,7 @@ import pytest
 import xarray
 
 TABLE_2 = Path(__file__).parents[1] / "published" / "data" / "feng2008_table2_particles.csv"
+STUDIES = Path(__file__).parents[2] / "studies"
 PACK = ("pack", "--radii", "uniform:0.05:0.1", "--box", "1,1", "--seed", 91)
 SOLVE = ("solve", TABLE_2, "--box", "1,1")
 
@@ -50,11 +51,29 @@ def test_a_link_is_written_through_and_the_mode_stays(etc_engine, tmp_path, comm
 
 @pytest.mark.parametrize("command", [PACK, SOLVE])
 def test_devices_and_pipes_are_refused_and_stay(etc_engine, tmp_path, command):
-    pipe = tmp_path / "pipe.csv"
+    pipe = tmp_path / "pipe.nc"
     os.mkfifo(pipe)
     done = etc_engine(*command, "-o", pipe)
     assert (done.returncode, "it is a device or a pipe" in done.stderr) == (2, True)
     assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        SOLVE,
+        ("homogenize", TABLE_2, "--box", "1,1", "--matrix", 1, "--inclusion", 2),
+        ("sweep", STUDIES / "density_angle/study.toml"),
+        ("transient", STUDIES / "feng2009/transient.toml"),
+    ],
+)
+def test_netcdf_under_the_name_of_another_format_is_refused(etc_engine, tmp_path, command):
+    done = etc_engine(*command, "-o", tmp_path / "out.csv")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "etc-engine: the output is written as netCDF: name it out.nc, found 'out.csv'\n",
+    )
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_name_with_wildcards_leaves_the_files_of_others(etc_engine, tmp_path):

@@ -22,7 +22,6 @@ RARE = {
     "etc_engine.laws.disk:_mutual_resistances",  # public functions of closed forms
     "etc_engine.laws.sphere:_mutual",
     "etc_engine.medium.cut_contacts:_mark",  # particles that other contacts cut
-    "etc_engine.packing.random_sequential:_uncovered",  # a packing near saturation
     "etc_engine.structure.clipping:rank",  # only within other kernels, with literal arguments
 }
 """Kernels that no common command needs: they are compiled when they are called."""

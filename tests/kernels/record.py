@@ -112,6 +112,7 @@ OTHERS = (
     f"homogenize thin.csv --box 1,1,1 --boundary walls {MATRIX} --resolution 24",
     f"homogenize loose.csv --box 1,1 --boundary walls {MATRIX} --resolution 40",
     f"homogenize loose.csv --box 1,1 --periodic xy {MATRIX} --resolution 40 --solver eyre-milton",
+    f"pack --method random-sequential --radii equal:0.08 --density 0.33 {SPHERES} -o full.csv",  # near saturation
     "pack --radii uniform:0.003:0.006 --box 1,1 --seed 3 -o many.csv",  # enough unknowns for multigrid
     "solve many.csv --box 1,1 --contact-angle 5 --json",
     "sweep disks.toml -o disks.nc",

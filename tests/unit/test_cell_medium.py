@@ -16,6 +16,7 @@ from etc_engine.medium.conduction import Conduction
 from etc_engine.medium.medium import Medium, Pores
 from etc_engine.medium.rules import bonded_contacts, overlap_contacts
 from etc_engine.medium.walls import Convective, FixedTemperature, HeatFlux
+from etc_engine.packing import PackingSpec, pack, parse_radii
 from etc_engine.packing.particles import ParticlePacking
 from etc_engine.realization import effective_conductivity, field_along, find_engine
 from etc_engine.realization.engines import linked_medium
@@ -223,3 +224,16 @@ def test_the_same_geometry_without_a_network(feng_particles):
     assert np.array_equal(
         effective_conductivity(medium).tensor, cell_conductivity(bare, np.ones(12), 0.1).tensor, equal_nan=True
     )
+
+
+@pytest.mark.parametrize("pores", [1e-5, 1e-7])
+def test_touching_disks_at_a_high_contrast_balance(pores):
+    """Rim nodes 1e-5 radii apart: the heat flows at the walls are equal, and a mirror image conducts the same."""
+    spec = PackingSpec("advancing-front", parse_radii("uniform:0.02:0.04"), Box((1.0, 1.0)))
+    packing = pack(spec, np.random.default_rng(7))
+    turned = ParticlePacking(1.0 - packing.centers[:, ::-1], packing.radii, packing.box)
+    found = []
+    for particles, axis in ((packing, 0), (turned, 1)):
+        medium = Medium(particles, 1.0, overlap_contacts(particles), Pores(pores))
+        found.append(effective_conductivity(medium, method="cell", axes=(axis,)).tensor[axis, axis])
+    assert found[0] == pytest.approx(found[1], rel=1e-5)

@@ -71,3 +71,13 @@ def disk_energy(angles, count, conductivity, spare, out):  # type: ignore[no-unt
         row[0] = (inverse[end] + inverse[0]) * source[0] - inverse[end] * source[end] - inverse[0] * source[1]
         low, high = inverse[end - 1], inverse[end]
         row[end] = (low + high) * source[end] - low * source[end - 1] - high * source[0]
+    # close nodes leave round-off that grows with inverse[i]^2: a uniform temperature still must give no flow
+    for i in range(count):
+        row = out[i, :count]
+        total = 0.0
+        for j in range(i):
+            row[j] = out[j, i]
+            total += row[j]
+        for j in range(i + 1, count):
+            total += row[j]
+        row[i] = -total
