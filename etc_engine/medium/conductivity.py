@@ -191,7 +191,7 @@ def check_balance(heat_in: float, heat_out: float, energy: float) -> None:
     if max(abs(heat_in - heat_out), abs(heat_in - energy)) > BALANCE * abs(energy):
         raise ConvergenceError(
             f"the heat flows do not balance: {heat_in:.10g} in, {heat_out:.10g} out, energy {energy:.10g}; "
-            f"ask for a smaller tolerance"
+            f"conductivities so far apart leave too much round-off: bring them closer, or ask for a smaller tolerance"
         )
 
 
