@@ -85,11 +85,11 @@ def homogenize_command(
 
     if plot is not None:
         check_picture(plot)
-    if output is not None:
-        check_netcdf(output)
     for path in (output, plot):
         if path is not None:
             check_place(path, inclusions)
+    if output is not None:
+        check_netcdf(output)
     if image.asked(inclusions):
         record = _of_image(inclusions, words, image, plot, given)
         if output is not None:

@@ -44,8 +44,6 @@ class SolveOutputs:
         from etc_engine.cli.options import check_netcdf, check_picture, check_place
         from etc_engine.errors import InputError
 
-        if self.netcdf is not None:
-            check_netcdf(self.netcdf)
         if self.plot is not None:
             check_picture(self.plot)
         if self.vtk is not None and self.vtk.suffix != ".vtp":
@@ -53,6 +51,8 @@ class SolveOutputs:
         for path in (self.netcdf, self.vtk, self.plot):
             if path is not None:
                 check_place(path, particles)
+        if self.netcdf is not None:
+            check_netcdf(self.netcdf)
 
 
 def write_outputs(outputs: SolveOutputs, field: ParticleField, record: dict[str, Any], table: ParticleTable) -> None:

@@ -62,8 +62,8 @@ def _run_meshless(content: dict[str, Any], wanted: Wanted) -> int:
     for name, given in (("--resume", wanted.resume), ("--plot", wanted.plot), ("--vtk", wanted.vtk)):
         if given:
             raise InputError(f"{name} is only valid with studies of kind 'network', this one is of kind 'meshless'")
-    check_netcdf(wanted.output)
     check_place(wanted.output, wanted.study, replaces_result=True)
+    check_netcdf(wanted.output)
     result = run_study(content, str(wanted.study))
     with replacing(wanted.output) as file:
         result.assign_attrs(study_file=wanted.text).to_netcdf(file)
@@ -144,7 +144,6 @@ def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
     inputs = [wanted.study]
     if isinstance(study.packing, FileTable):
         inputs.append(wanted.study.parent / study.packing.files)
-    check_netcdf(wanted.output)
     if wanted.plot is not None:
         check_picture(wanted.plot)
     if wanted.vtk is not None:
@@ -155,6 +154,7 @@ def _check_outputs(study: NetworkStudy, wanted: Wanted) -> None:
     for path in (wanted.output, wanted.plot, wanted.vtk):
         if path is not None:
             check_place(path, *inputs, replaces_result=path == wanted.output)
+    check_netcdf(wanted.output)
 
 
 def _finish(study: NetworkStudy, wanted: Wanted) -> int:

@@ -179,5 +179,5 @@ def test_a_conductivity_whose_products_overflow_is_refused_in_words(value):
     with pytest.raises(InputError, match="the pores"):
         Pores(value)
     if value != np.inf:
-        with pytest.raises(InputError, match=r"from 1e-100 to 1e\+100, 0 for an insulator, or inf"):
+        with pytest.raises(InputError, match=r"from 1e-100 to 1e\+100, or, with homogenize, 0"):
             Medium(ParticlePacking([[0.5, 0.5]], [0.2], Box((1.0, 1.0))), value)
